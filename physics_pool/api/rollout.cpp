@@ -1,0 +1,142 @@
+#include "physics_pool/api/rollout.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics_pool/sampling/counter_rng.hpp"
+
+namespace jostle::physics_pool {
+namespace {
+
+Error wrong(const std::string& field, const std::string& got, const std::string& wanted) {
+  return {Code::kInvalidArgument, fmt::format("{}: got {}, wanted {}", field, got, wanted)};
+}
+
+Result<void> check_size(const char* field, std::size_t got, std::size_t wanted) {
+  if (got == wanted) return {};
+  return wrong(field, fmt::format("{} values", got), std::to_string(wanted));
+}
+
+Result<void> check_finite(const char* field, const std::vector<double>& values) {
+  const auto bad = std::ranges::find_if_not(values, [](double value) { return std::isfinite(value); });
+  if (bad == values.end()) return {};
+  return wrong(fmt::format("{}[{}]", field, bad - values.begin()), fmt::format("{}", *bad),
+               "a finite number");
+}
+
+Result<void> check_weights(const Objective& o) {
+  const std::pair<const char*, double> weights[] = {
+      {"goal", o.goal}, {"angle", o.angle}, {"acceleration", o.acceleration},
+      {"disturbance", o.disturbance}, {"disturbance_rotation", o.disturbance_rotation},
+      {"edge", o.edge}, {"edge_rate", o.edge_rate}, {"edge_exponent_max", o.edge_exponent_max},
+      {"edge_margin", o.edge_margin}, {"topple", o.topple}, {"topple_angle", o.topple_angle},
+      {"drop", o.drop}, {"drop_height", o.drop_height}, {"success_cost", o.success_cost}};
+  for (const auto& [name, value] : weights) {
+    if (value >= 0 && std::isfinite(value)) continue;
+    return wrong(fmt::format("objective.{}", name), fmt::format("{}", value),
+                 "a finite number >= 0, or rollouts could not be stopped early");
+  }
+  return {};
+}
+
+}  // namespace
+
+ControlSequence sample_controls(const ControlSequence& nominal, const SamplingLaw& law,
+                                std::uint32_t sample) {
+  ControlSequence controls = nominal;
+  for (int t = 0; t < nominal.steps(); ++t) {
+    const std::span<double> u = controls.step(t);
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      if (law.sigma[i] > 0) {
+        u[i] += law.sigma[i] * standard_normal(law.seed, {.stream = law.stream,
+                                                          .sample = sample,
+                                                          .step = static_cast<std::uint32_t>(t),
+                                                          .axis = static_cast<std::uint32_t>(i)});
+      }
+      u[i] = std::clamp(u[i], -law.limit[i], law.limit[i]);
+    }
+  }
+  return controls;
+}
+
+int select_winner(const std::vector<RolloutOutcome>& outcomes, double incumbent) {
+  int winner = -1;
+  double best = incumbent;
+  for (int i = 0; i < static_cast<int>(outcomes.size()); ++i) {
+    if (outcomes[i].end == End::kSucceeded) return i;
+    if (outcomes[i].end == End::kCompleted && outcomes[i].cost < best) {
+      best = outcomes[i].cost;
+      winner = i;
+    }
+  }
+  return winner;
+}
+
+Result<void> validate(const RolloutBatch& batch) {
+  if (batch.nominal.nu < 1 || batch.nominal.nu > 64) {
+    return wrong("nominal.nu", std::to_string(batch.nominal.nu), "1 to 64");
+  }
+  const auto nu = static_cast<std::size_t>(batch.nominal.nu);
+  if (batch.nominal.values.empty() || batch.nominal.values.size() % nu != 0) {
+    return wrong("nominal.values", fmt::format("{} values", batch.nominal.values.size()),
+                 fmt::format("a multiple of nu = {}, at least one step", nu));
+  }
+  if (batch.nominal.steps() > kMaxSteps) {
+    return wrong("nominal.values", fmt::format("{} steps", batch.nominal.steps()),
+                 fmt::format("at most {}", kMaxSteps));
+  }
+  if (batch.samples < 1 || batch.samples > kMaxSamples) {
+    return wrong("samples", std::to_string(batch.samples), fmt::format("1 to {}", kMaxSamples));
+  }
+  if (batch.first_sample > UINT32_MAX - batch.samples) {
+    return wrong("first_sample", std::to_string(batch.first_sample), "no wrap-around");
+  }
+  if (!(batch.step_duration > 0 && batch.step_duration <= kMaxStepDuration)) {
+    return wrong("step_duration", fmt::format("{} s", batch.step_duration),
+                 fmt::format("more than 0, at most {} s", kMaxStepDuration));
+  }
+  if (batch.x0.q.size() > kMaxStateSize || batch.x0.v.size() > kMaxStateSize) {
+    return wrong("x0", fmt::format("{} + {} values", batch.x0.q.size(), batch.x0.v.size()),
+                 fmt::format("at most {} each", kMaxStateSize));
+  }
+  if (std::isnan(batch.incumbent)) return wrong("incumbent", "NaN", "a cost or +inf");
+  if (batch.min_steps < 0) return wrong("min_steps", std::to_string(batch.min_steps), ">= 0");
+  if (batch.wait && (*batch.wait < batch.wait->zero() || *batch.wait > kMaxWait)) {
+    return wrong("wait", fmt::format("{} ns", batch.wait->count()), "0 to 10 s");
+  }
+  if (auto ok = check_size("u_before", batch.u_before.size(), nu); !ok) return ok;
+  if (auto ok = check_size("law.sigma", batch.law.sigma.size(), nu); !ok) return ok;
+  if (auto ok = check_size("law.limit", batch.law.limit.size(), nu); !ok) return ok;
+  for (std::size_t i = 0; i < nu; ++i) {
+    if (!(batch.law.sigma[i] >= 0)) {
+      return wrong(fmt::format("law.sigma[{}]", i), fmt::format("{}", batch.law.sigma[i]), ">= 0");
+    }
+    if (!(batch.law.limit[i] > 0)) {
+      return wrong(fmt::format("law.limit[{}]", i), fmt::format("{}", batch.law.limit[i]), "> 0");
+    }
+  }
+  if (auto ok = check_finite("x0.q", batch.x0.q); !ok) return ok;
+  if (auto ok = check_finite("x0.v", batch.x0.v); !ok) return ok;
+  if (auto ok = check_finite("u_before", batch.u_before); !ok) return ok;
+  if (auto ok = check_finite("nominal.values", batch.nominal.values); !ok) return ok;
+  return check_weights(batch.objective);
+}
+
+Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, double time_step) {
+  if (auto ok = validate(batch); !ok) return ok;
+  if (auto ok = check_size("x0.q", batch.x0.q.size(), layout.nq); !ok) return ok;
+  if (auto ok = check_size("x0.v", batch.x0.v.size(), layout.nv); !ok) return ok;
+  if (batch.nominal.nu != layout.nu) {
+    return wrong("nominal.nu", std::to_string(batch.nominal.nu), std::to_string(layout.nu));
+  }
+  const double steps = batch.step_duration / time_step;
+  if (steps < 0.5 || std::abs(steps - std::round(steps)) > 1e-6 * steps) {
+    return wrong("step_duration", fmt::format("{} s", batch.step_duration),
+                 fmt::format("a multiple of the world's time step, {} s", time_step));
+  }
+  return {};
+}
+
+}  // namespace jostle::physics_pool

@@ -1,0 +1,38 @@
+#pragma once
+/// \file
+/// Guards around MuJoCo: its errors become exceptions of ours, its warnings
+/// stay in mjData, and nothing is ever written to a log file.
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <stdexcept>
+
+namespace jostle::physics_pool {
+
+/// What mju_error would have said before ending the process. Thrown through
+/// the engine's frames, so the mjData in use must be discarded. Never leaves
+/// physics_pool/local.
+class EngineError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Installs the error, warning and contact handlers; safe to call repeatedly.
+void install_engine_handlers();
+
+struct ModelDeleter {
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+};
+struct DataDeleter {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+using ModelPtr = std::unique_ptr<mjModel, ModelDeleter>;
+using DataPtr = std::unique_ptr<mjData, DataDeleter>;
+
+/// geom_user[0] of the surface: it supports a body only while the body's
+/// centre is above it. MuJoCo's planes are infinite, yet they give steadier
+/// contacts than boxes (four points under a cylinder instead of one).
+inline constexpr double kSurfaceMark = 1.0;
+
+}  // namespace jostle::physics_pool

@@ -1,0 +1,60 @@
+#pragma once
+/// \file
+/// Threads that run rollouts, one at a time each, in the order they arrive.
+/// The in-process pool and the worker process both stand on it.
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "physics_pool/local/rollout.hpp"
+
+namespace jostle::physics_pool {
+
+/// A batch on its way: what its rollouts read and whom they tell.
+struct BatchRun {
+  RolloutBatch batch;
+  WorldPtr world;
+  BatchSignals signals;
+  /// Called once for every submitted sample, on the thread that ran it (or
+  /// skipped it); must be quick and must not throw. `thread` counts from 0.
+  std::function<void(RolloutOutcome, int thread)> on_outcome;
+};
+/// Shared by the submitter and every queued sample; the last one drops it.
+using BatchRunPtr = std::shared_ptr<BatchRun>;
+
+class Executor {
+ public:
+  explicit Executor(int threads);
+  /// Skips what is queued and waits for what runs (a millisecond once its
+  /// signals are cancelled; a whole rollout otherwise).
+  ~Executor();
+
+  int threads() const { return static_cast<int>(threads_.size()); }
+
+  /// Queues one sample. Thread safe.
+  void submit(BatchRunPtr run, std::uint32_t sample);
+
+  /// Rollouts queued or running.
+  std::size_t load() const;
+
+ private:
+  struct Job {
+    BatchRunPtr run;
+    std::uint32_t sample = 0;
+  };
+
+  void work(std::stop_token stop, int thread);
+
+  mutable std::mutex mutex_;  // guards jobs_ and running_
+  std::condition_variable_any wake_;
+  std::deque<Job> jobs_;
+  std::size_t running_ = 0;
+  std::vector<std::jthread> threads_;
+};
+
+}  // namespace jostle::physics_pool

@@ -1,0 +1,92 @@
+#include "physics_pool/local/rollout.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+namespace jostle::physics_pool {
+namespace {
+
+// Waits as a scheduling study asks, in slices so that a cancelled batch ends.
+RolloutOutcome wait_instead(const RolloutBatch& batch, std::uint32_t sample, BatchSignals& signals) {
+  constexpr std::chrono::milliseconds kSlice{5};
+  const auto end = std::chrono::steady_clock::now() + *batch.wait;
+  while (!signals.is_obsolete(sample)) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now >= end) return {.sample = sample, .end = End::kCompleted, .cost = 0.0};
+    std::this_thread::sleep_until(std::min(end, now + kSlice));
+  }
+  return {.sample = sample};
+}
+
+}  // namespace
+
+RolloutOutcome run_rollout(Simulator& simulator, const RolloutBatch& batch, std::uint32_t sample,
+                           BatchSignals& signals) {
+  if (batch.wait) return wait_instead(batch, sample, signals);
+
+  const TaskGeometry& geometry = simulator.world().geometry();
+  const Objective& objective = batch.objective;
+  const ControlSequence controls = sample_controls(batch.nominal, batch.law, sample);
+  const int steps = controls.steps();
+  const int engine_steps =
+      static_cast<int>(std::lround(batch.step_duration / simulator.world().time_step()));
+  const auto obsolete = [&signals, sample] { return signals.is_obsolete(sample); };
+
+  RolloutOutcome outcome{.sample = sample};
+  outcome.trajectory.reserve(static_cast<std::size_t>(steps) + 1);
+  outcome.trajectory.push_back(batch.x0);
+  State x = batch.x0;
+  double sum = 0.0;
+  const auto finish = [&](End end) {
+    outcome.end = end;
+    outcome.steps = static_cast<std::uint32_t>(outcome.step_costs.size());
+    outcome.grasped = grasped(geometry, outcome.trajectory.back(), objective);
+    if (end == End::kCompleted || end == End::kSucceeded) outcome.cost = sum;
+    // Only a possible winner's states are worth their way.
+    const bool may_win = end == End::kSucceeded || (end == End::kCompleted && sum < batch.incumbent);
+    if (!may_win && !batch.want_all_trajectories) outcome.trajectory.clear();
+    return std::move(outcome);
+  };
+
+  for (int t = 0; t < steps; ++t) {
+    const auto u_before = t == 0 ? std::span<const double>(batch.u_before)
+                                 : std::as_const(controls).step(t - 1);
+    const auto u = std::as_const(controls).step(t);
+    auto advance = simulator.advance(x, u, engine_steps, obsolete);
+    outcome.engine_steps += advance.engine_steps;
+    if (advance.interrupted) return finish(End::kSkipped);
+    if (!advance.diverged.empty()) {
+      outcome.reason = std::move(advance.diverged);
+      return finish(End::kDiverged);
+    }
+    const double running =
+        running_cost(geometry, objective, u_before, u, outcome.trajectory.back(), x);
+    sum += running;
+    outcome.step_costs.push_back(running);
+    outcome.trajectory.push_back(x);
+
+    const bool last = t + 1 == steps;
+    const double goal = objective.goal * goal_cost(geometry, x, objective.angle);
+    if (batch.stop_on_success && t >= batch.min_steps && sum + goal <= objective.success_cost &&
+        grasped(geometry, x, objective)) {
+      sum += goal;
+      outcome.step_costs.back() += goal;
+      signals.offer_success(sample);
+      return finish(End::kSucceeded);
+    }
+    if (last) {
+      sum += goal;
+      outcome.step_costs.back() += goal;
+    }
+    const bool can_succeed = batch.stop_on_success && sum <= objective.success_cost;
+    if (!last && batch.stop_losers && !can_succeed &&
+        (sum >= batch.incumbent || sum > signals.best())) {
+      return finish(End::kLost);
+    }
+  }
+  signals.offer_cost(sum);
+  return finish(End::kCompleted);
+}
+
+}  // namespace jostle::physics_pool

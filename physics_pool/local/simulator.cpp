@@ -1,0 +1,93 @@
+#include "physics_pool/local/simulator.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace jostle::physics_pool {
+
+Simulator::Simulator(WorldPtr world)
+    : world_(std::move(world)), data_(mj_makeData(world_->model())) {}
+
+void Simulator::begin(const State& x, std::span<const double> u) {
+  mjData& data = *data_;
+  std::ranges::copy(x.q, data.qpos);
+  std::ranges::copy(x.v, data.qvel);
+  std::fill_n(data.qacc_warmstart, world_->model()->nv, 0.0);
+  for (mjWarningStat& warning : data.warning) warning.number = 0;
+  data.time = 0.0;
+  data.ctrl[0] = u[kControlX];
+  data.ctrl[1] = u[kControlY];
+  data.ctrl[2] = u[kControlRotation];
+  data.ctrl[3] = data.ctrl[4] = u[kControlOpening] / 2;  // each finger takes half
+}
+
+void Simulator::step() { mj_step(world_->model(), data_.get()); }
+
+std::string Simulator::divergence() const {
+  for (int i = 0; i < mjNWARNING; ++i) {
+    if (data_->warning[i].number > 0) {
+      return mju_warningText(i, static_cast<std::size_t>(data_->warning[i].lastinfo));
+    }
+  }
+  const mjModel& model = *world_->model();
+  const bool finite = std::all_of(data_->qpos, data_->qpos + model.nq, [](double value) { return std::isfinite(value); }) &&
+                      std::all_of(data_->qvel, data_->qvel + model.nv, [](double value) { return std::isfinite(value); });
+  return finite ? "" : "non-finite state";
+}
+
+void Simulator::read(State& x) const {
+  const mjModel& model = *world_->model();
+  x.q.assign(data_->qpos, data_->qpos + model.nq);
+  x.v.assign(data_->qvel, data_->qvel + model.nv);
+}
+
+void Simulator::add_velocity(int dof, double amount) { data_->qvel[dof] += amount; }
+
+Simulator::Advance Simulator::advance(State& x, std::span<const double> u, int engine_steps,
+                                      const std::function<bool()>& interrupted) {
+  Advance result;
+  try {
+    begin(x, u);
+    for (int i = 0; i < engine_steps; ++i) {
+      if (interrupted && interrupted()) {
+        result.interrupted = true;
+        return result;
+      }
+      step();
+      ++result.engine_steps;
+    }
+    result.diverged = divergence();
+    read(x);
+  } catch (const EngineError& error) {
+    // The engine was left in the middle of a step: its scratch is unusable.
+    data_.reset(mj_makeData(world_->model()));
+    result.diverged = error.what();
+  }
+  return result;
+}
+
+State separate(const World& world, const State& x, double depth, int rounds) {
+  const mjModel* model = world.model();
+  const DataPtr data(mj_makeData(model));
+  State result = x;
+  std::ranges::fill(result.v, 0.0);
+  std::ranges::copy(result.q, data->qpos);
+  for (int round = 0; round < rounds; ++round) {
+    mj_forward(model, data.get());
+    const mjContact* begin = data->contact;
+    const bool apart = std::none_of(begin, begin + data->ncon, [&](const mjContact& contact) {
+      return contact.dist < -depth;
+    });
+    if (apart) break;
+    std::fill_n(data->qvel, model->nv, 0.0);
+    mj_step(model, data.get());
+    // The robot's place is measured better than any object's: it yields nothing.
+    std::copy_n(x.q.begin(), kRobotJoints, data->qpos);
+  }
+  result.q.assign(data->qpos, data->qpos + model->nq);
+  return result;
+}
+
+}  // namespace jostle::physics_pool

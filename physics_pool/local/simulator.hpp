@@ -1,0 +1,54 @@
+#pragma once
+/// \file
+/// The fine model F of one thread.
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "idl/types/state.hpp"
+#include "physics_pool/local/world.hpp"
+
+namespace jostle::physics_pool {
+
+/// Steps one world. Owns the engine's scratch data; one thread at a time.
+/// Nothing is allocated after construction.
+class Simulator {
+ public:
+  explicit Simulator(WorldPtr world);
+
+  const World& world() const { return *world_; }
+
+  /// How far an advance came.
+  struct Advance {
+    std::uint64_t engine_steps = 0;
+    bool interrupted = false;
+    std::string diverged;  ///< empty, or why the state is of no use
+  };
+
+  /// x <- F(x, u): resets the solver's warm start, sets state and control, runs
+  /// `engine_steps`. `interrupted` is asked before each step; may be empty.
+  Advance advance(State& x, std::span<const double> u, int engine_steps,
+                  const std::function<bool()>& interrupted = {});
+
+  /// The same in parts, for worlds that are observed or disturbed while they
+  /// move: begin once, then step as often as needed.
+  void begin(const State& x, std::span<const double> u);
+  void step();
+  std::string divergence() const;
+  void read(State& x) const;
+  void add_velocity(int dof, double amount);
+
+ private:
+  WorldPtr world_;
+  DataPtr data_;
+};
+
+/// Moves objects apart that overlap in x, as happens when a belief of shapes
+/// meets a measurement of poses: steps the world with its velocities held at
+/// zero until no two bodies are deeper in each other than `depth` metres, or
+/// for `rounds` steps at most. The robot stays where it is. Cf. Eq. 6.9.
+State separate(const World& world, const State& x, double depth = 0.0005, int rounds = 200);
+
+}  // namespace jostle::physics_pool

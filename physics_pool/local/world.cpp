@@ -1,0 +1,58 @@
+#include "physics_pool/local/world.hpp"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <mutex>
+
+#include "physics_pool/local/model_xml.hpp"
+
+namespace jostle::physics_pool {
+namespace {
+
+constexpr const char* kFileName = "world.xml";
+
+Result<ModelPtr> compile_xml(const std::string& xml) {
+  // The engine's compiler keeps the last parsed file in a global.
+  static std::mutex compiler;
+  const std::lock_guard lock(compiler);
+
+  // mjVFS is 2 MB of names: not for the stack.
+  const auto files = std::make_unique<mjVFS>();
+  mj_defaultVFS(files.get());
+  mj_makeEmptyFileVFS(files.get(), kFileName, static_cast<int>(xml.size()));
+  std::memcpy(files->filedata[mj_findFileVFS(files.get(), kFileName)], xml.data(), xml.size());
+  char message[1000] = "";
+  ModelPtr model;
+  try {
+    model.reset(mj_loadXML(kFileName, files.get(), message, sizeof message));
+  } catch (const EngineError& error) {
+    std::snprintf(message, sizeof message, "%s", error.what());
+  }
+  mj_deleteVFS(files.get());
+  if (!model) {
+    return Error{Code::kInvalidArgument, fmt::format("scene: the engine refused it: {}", message)};
+  }
+  return model;
+}
+
+}  // namespace
+
+World::World(const Scene& scene, ModelPtr model)
+    : scene_(scene), hash_(scene_hash(scene)), geometry_(scene), model_(std::move(model)) {}
+
+Result<WorldPtr> World::compile(const Scene& scene) {
+  install_engine_handlers();
+  auto model_result = compile_xml(model_xml(scene));
+  if (!model_result) return model_result.error();
+  WorldPtr world(new World(scene, std::move(model_result).value()));
+  const StateLayout& layout = world->geometry().layout;
+  if (world->model()->nq != layout.nq || world->model()->nv != layout.nv) {
+    return Error{Code::kInternal,
+                 fmt::format("scene '{}': compiled to nq {} and nv {}, its layout says {} and {}",
+                             scene.name, world->model()->nq, world->model()->nv, layout.nq, layout.nv)};
+  }
+  return world;
+}
+
+}  // namespace jostle::physics_pool

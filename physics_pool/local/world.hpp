@@ -1,0 +1,41 @@
+#pragma once
+/// \file
+/// World: a compiled scene.
+
+#include <memory>
+
+#include "idl/types/hash.hpp"
+#include "idl/types/result.hpp"
+#include "physics_pool/local/engine.hpp"
+#include "physics_pool/objective/terms.hpp"
+#include "physics_pool/scene/scene.hpp"
+
+namespace jostle::physics_pool {
+
+class World;
+/// Shared: every simulating thread reads the same compiled model, and the last
+/// one to finish with it frees it.
+using WorldPtr = std::shared_ptr<const World>;
+
+/// Immutable after compilation; read by any number of threads.
+class World {
+ public:
+  /// Errors   kInvalidArgument  the engine refused the model; says why.
+  static Result<WorldPtr> compile(const Scene& scene);
+
+  const Scene& scene() const { return scene_; }
+  const Hash& hash() const { return hash_; }
+  const TaskGeometry& geometry() const { return geometry_; }
+  const mjModel* model() const { return model_.get(); }
+  double time_step() const { return scene_.physics.time_step; }
+
+ private:
+  World(const Scene& scene, ModelPtr model);
+
+  Scene scene_;
+  Hash hash_;
+  TaskGeometry geometry_;
+  ModelPtr model_;
+};
+
+}  // namespace jostle::physics_pool

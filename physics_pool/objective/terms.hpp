@@ -1,0 +1,62 @@
+#pragma once
+/// \file
+/// The terms of Eq. 3.2, each a small function of states at the borders of a
+/// control step, and the predicates built on them. Engine-free.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "idl/types/state.hpp"
+#include "physics_pool/api/objective.hpp"
+#include "physics_pool/scene/scene.hpp"
+
+namespace jostle::physics_pool {
+
+/// What the terms need to know of a scene.
+struct TaskGeometry {
+  explicit TaskGeometry(const Scene& scene);
+
+  StateLayout layout;
+  double half_x = 0.0, half_y = 0.0;  ///< m, half extents of the surface
+  std::vector<double> rest_heights;   ///< [objects] m
+};
+
+/// Distance and bearing of the target from the hand, Fig. 3.2.
+struct TargetBearing {
+  double distance = 0.0;  ///< d_T, m
+  double angle = 0.0;     ///< phi_T, rad, in [0, pi]
+};
+TargetBearing target_bearing(const TaskGeometry& geometry, const State& x);
+
+/// c_g(x) = d_T^2 + w_phi · phi_T^2
+double goal_cost(const TaskGeometry& geometry, const State& x, double angle_weight);
+
+/// c_a(u_before, u) = |u - u_before|^2
+double acceleration_cost(std::span<const double> u_before, std::span<const double> u);
+
+/// c_d(x0, x1) = sum over the objects but the target of |dp|^2 + w·|rotation|^2
+double disturbance_cost(const TaskGeometry& geometry, const State& x0, const State& x1,
+                        double rotation_weight);
+
+/// c_e(x0, x1) = sum of exp(min(k·d_E, cap)) over all objects outside the safe
+/// zone at x1, where d_E is how far the object moved from x0 to x1.
+double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1,
+                 const Objective& objective);
+
+/// Objects whose axis leans more than `angle` from upright, rad.
+int toppled_objects(const TaskGeometry& geometry, const State& x, double angle);
+
+/// Indices of objects whose centre is more than `height` m below its resting place.
+std::vector<int> dropped_objects(const TaskGeometry& geometry, const State& x, double height);
+int count_dropped(const TaskGeometry& geometry, const State& x, double height);
+
+/// Whether the target's centre is in the hand's pre-grasp region and stands.
+bool grasped(const TaskGeometry& geometry, const State& x, const Objective& objective);
+
+/// All running terms of one control step, weighted.
+double running_cost(const TaskGeometry& geometry, const Objective& objective,
+                    std::span<const double> u_before, std::span<const double> u, const State& x0,
+                    const State& x1);
+
+}  // namespace jostle::physics_pool

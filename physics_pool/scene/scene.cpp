@@ -1,0 +1,221 @@
+#include "physics_pool/scene/scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "physics_pool/scene/planar_gripper.hpp"
+
+namespace jostle::physics_pool {
+namespace {
+
+// A footprint is a rectangle or a disc in the surface's plane.
+struct Footprint {
+  double x = 0.0, y = 0.0, yaw = 0.0;
+  double half_x = 0.0, half_y = 0.0;  // rectangle
+  double radius = 0.0;                // disc, where > 0
+};
+
+Footprint footprint(const SceneObject& object) {
+  Footprint result{.x = object.x, .y = object.y, .yaw = object.yaw};
+  if (object.shape == Shape::kCylinder) {
+    result.radius = object.radius;
+  } else {
+    result.half_x = object.size[0] / 2;
+    result.half_y = object.size[1] / 2;
+  }
+  return result;
+}
+
+std::vector<Footprint> footprint(const SceneRobot& robot) {
+  namespace hand = planar_gripper;
+  const double c = std::cos(robot.rotation), s = std::sin(robot.rotation);
+  const auto part = [&](double x_min, double x_max, double y, double width) {
+    const double x = (x_min + x_max) / 2;
+    return Footprint{.x = robot.x + c * x - s * y,
+                     .y = robot.y + s * x + c * y,
+                     .yaw = robot.rotation,
+                     .half_x = (x_max - x_min) / 2,
+                     .half_y = width / 2};
+  };
+  const double finger_y = (robot.opening + hand::kFingerThickness) / 2;
+  return {part(0, hand::kFingerLength, finger_y, hand::kFingerThickness),
+          part(0, hand::kFingerLength, -finger_y, hand::kFingerThickness),
+          part(-hand::kPalmDepth, 0, 0, hand::kPalmWidth),
+          part(-hand::kPalmDepth - hand::kArmLength, -hand::kPalmDepth, 0, hand::kArmWidth)};
+}
+
+double disc_gap(const Footprint& disc, const Footprint& other) {
+  const double dx = disc.x - other.x, dy = disc.y - other.y;
+  if (other.radius > 0) return std::hypot(dx, dy) - disc.radius - other.radius;
+  const double c = std::cos(other.yaw), s = std::sin(other.yaw);
+  const double along = std::abs(c * dx + s * dy) - other.half_x;
+  const double across = std::abs(-s * dx + c * dy) - other.half_y;
+  const double outside = std::hypot(std::max(along, 0.0), std::max(across, 0.0));
+  return outside + std::min(std::max(along, across), 0.0) - disc.radius;
+}
+
+// The largest separation along any of the four edge normals: exact where
+// rectangles overlap, a lower bound of their distance where they do not.
+double rectangle_gap(const Footprint& a, const Footprint& b) {
+  double gap = -std::numeric_limits<double>::infinity();
+  const double dx = b.x - a.x, dy = b.y - a.y;
+  for (const double yaw : {a.yaw, a.yaw + std::numbers::pi / 2, b.yaw, b.yaw + std::numbers::pi / 2}) {
+    const auto reach = [&](const Footprint& f) {
+      return f.half_x * std::abs(std::cos(f.yaw - yaw)) + f.half_y * std::abs(std::sin(f.yaw - yaw));
+    };
+    const double centres = std::abs(dx * std::cos(yaw) + dy * std::sin(yaw));
+    gap = std::max(gap, centres - reach(a) - reach(b));
+  }
+  return gap;
+}
+
+double footprint_gap(const Footprint& a, const Footprint& b) {
+  if (a.radius > 0) return disc_gap(a, b);
+  if (b.radius > 0) return disc_gap(b, a);
+  return rectangle_gap(a, b);
+}
+
+Error invalid(const std::string& origin, const std::string& field, const std::string& problem) {
+  return {Code::kInvalidArgument, fmt::format("{}: {}: {}", origin, field, problem)};
+}
+
+bool in_range(double value, double low, double high) { return value >= low && value <= high; }
+
+// A field, its value and the closed range it must lie in.
+struct Range {
+  const char* field;
+  double value, low, high;
+  const char* unit;
+};
+
+Result<void> check(const std::string& origin, const std::string& where,
+                   std::initializer_list<Range> ranges) {
+  for (const Range& r : ranges) {
+    if (in_range(r.value, r.low, r.high)) continue;  // false for NaN
+    return invalid(origin, where + r.field,
+                   fmt::format("got {}, wanted {} to {} {}", r.value, r.low, r.high, r.unit));
+  }
+  return {};
+}
+
+constexpr double kSmallest = 0.002, kLargest = 2.0;  // m, any size of an object
+
+}  // namespace
+
+double SceneObject::rest_height() const {
+  return (shape == Shape::kBox ? size[2] : height) / 2;
+}
+
+int Scene::target() const {
+  const auto found = std::ranges::find(objects, task.target, &SceneObject::name);
+  return found == objects.end() ? -1 : static_cast<int>(found - objects.begin());
+}
+
+bool overlap(const SceneObject& a, const SceneObject& b, double gap) {
+  return footprint_gap(footprint(a), footprint(b)) < gap;
+}
+
+bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap) {
+  const Footprint body = footprint(object);
+  return std::ranges::any_of(footprint(scene.robot), [&](const Footprint& part) {
+    return footprint_gap(part, body) < gap;
+  });
+}
+
+Result<void> validate(const Scene& scene, const std::string& origin) {
+  if (scene.robot.model != "planar_gripper") {
+    return invalid(origin, "robot.model",
+                   fmt::format("got '{}', wanted one of: planar_gripper", scene.robot.model));
+  }
+  if (scene.task.kind != "grasp") {
+    return invalid(origin, "task.kind",
+                   fmt::format("got '{}', wanted one of: grasp", scene.task.kind));
+  }
+  const double half_x = scene.surface.size[0] / 2, half_y = scene.surface.size[1] / 2;
+  if (auto ok = check(origin, "",
+                      {{"surface.size[0]", scene.surface.size[0], 0.1, 10, "m"},
+                       {"surface.size[1]", scene.surface.size[1], 0.1, 10, "m"},
+                       {"surface.wall_height", scene.surface.wall_height, 0.01, 2, "m"},
+                       {"robot.start.x", scene.robot.x, -10, 10, "m"},
+                       {"robot.start.y", scene.robot.y, -10, 10, "m"},
+                       {"robot.start.rotation", scene.robot.rotation, -7, 7, "rad"},
+                       {"robot.start.opening", scene.robot.opening, 0, planar_gripper::kStroke, "m"},
+                       {"physics.time_step", scene.physics.time_step, 1e-4, 0.02, "s"},
+                       {"physics.iterations", double(scene.physics.iterations), 1, 1000, ""},
+                       {"physics.tolerance", scene.physics.tolerance, 0, 1, ""}});
+      !ok) {
+    return ok;
+  }
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const SceneObject& object = scene.objects[i];
+    const std::string where = fmt::format("objects[{}] ('{}').", i, object.name);
+    if (object.name.empty()) return invalid(origin, where + "name", "got '', wanted a name");
+    if (!names.insert(object.name).second) {
+      return invalid(origin, where + "name", "already taken by another object, wanted a unique name");
+    }
+    auto sizes = object.shape == Shape::kBox
+                     ? check(origin, where, {{"size[0]", object.size[0], kSmallest, kLargest, "m"},
+                                             {"size[1]", object.size[1], kSmallest, kLargest, "m"},
+                                             {"size[2]", object.size[2], kSmallest, kLargest, "m"}})
+                     : check(origin, where, {{"radius", object.radius, kSmallest, kLargest, "m"},
+                                             {"height", object.height, kSmallest, kLargest, "m"}});
+    if (!sizes) return sizes;
+    if (auto ok = check(origin, where, {{"mass", object.mass, 1e-4, 100, "kg"},
+                                        {"friction", object.friction, 0, 5, ""},
+                                        {"pose.x", object.x, -half_x, half_x, "m, on the surface"},
+                                        {"pose.y", object.y, -half_y, half_y, "m, on the surface"},
+                                        {"pose.yaw", object.yaw, -7, 7, "rad"}});
+        !ok) {
+      return ok;
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!overlap(object, scene.objects[j])) continue;
+      return invalid(origin, where + "pose",
+                     fmt::format("inside object '{}' by {:.1f} mm, wanted a free place",
+                                 scene.objects[j].name,
+                                 -1e3 * footprint_gap(footprint(object), footprint(scene.objects[j]))));
+    }
+    if (overlaps_robot(scene, object)) {
+      return invalid(origin, where + "pose",
+                     "inside the robot at its start, wanted a free place; move robot.start or the object");
+    }
+  }
+  if (scene.target() < 0) {
+    return invalid(origin, "task.target",
+                   fmt::format("got '{}', wanted the name of an object", scene.task.target));
+  }
+  return {};
+}
+
+StateLayout layout_of(const Scene& scene) {
+  StateLayout layout;
+  layout.joints = {"gripper_x", "gripper_y", "gripper_rotation", "finger_left", "finger_right"};
+  layout.nq = layout.nv = kRobotJoints;
+  layout.nu = kControlAxes;
+  for (const SceneObject& object : scene.objects) {
+    layout.objects.push_back({.name = object.name, .q = layout.nq, .v = layout.nv});
+    layout.nq += 7;
+    layout.nv += 6;
+  }
+  layout.target = scene.target();
+  return layout;
+}
+
+State initial_state(const Scene& scene) {
+  const SceneRobot& robot = scene.robot;
+  State state;
+  state.q = {robot.x, robot.y, robot.rotation, robot.opening / 2, robot.opening / 2};
+  for (const SceneObject& object : scene.objects) {
+    state.q.insert(state.q.end(), {object.x, object.y, object.rest_height(),
+                                   std::cos(object.yaw / 2), 0, 0, std::sin(object.yaw / 2)});
+  }
+  state.v.assign(static_cast<std::size_t>(layout_of(scene).nv), 0.0);
+  return state;
+}
+
+}  // namespace jostle::physics_pool

@@ -1,0 +1,104 @@
+#pragma once
+/// \file
+/// Scenes: what is where, as data. `scenes/README.md` documents the file format.
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "idl/types/hash.hpp"
+#include "idl/types/result.hpp"
+#include "idl/types/state.hpp"
+
+namespace jostle::physics_pool {
+
+enum class Shape { kBox, kCylinder };
+
+/// A rigid body that can be pushed. Frame B at its centre, z up at rest.
+struct SceneObject {
+  std::string name;
+  Shape shape = Shape::kBox;
+  std::array<double, 3> size{};  ///< box: full extents x, y, z, m
+  double radius = 0.0;           ///< cylinder, m
+  double height = 0.0;           ///< cylinder, m
+  double mass = 0.0;             ///< kg
+  double friction = 0.0;         ///< Coulomb coefficient against everything
+  double x = 0.0, y = 0.0;       ///< p_WoBo_W in the surface's plane, m
+  double yaw = 0.0;              ///< rad about z
+
+  /// m; how far the centre is above the surface at rest.
+  double rest_height() const;
+};
+
+/// The supporting surface, centred at the world's origin, top at z = 0. A shelf
+/// has walls on every side but -x, where the robot reaches in.
+struct Surface {
+  enum class Kind { kTable, kShelf };
+  Kind kind = Kind::kTable;
+  std::array<double, 2> size{0.6, 0.6};  ///< full extents x, y, m
+  double wall_height = 0.15;             ///< m, shelf only
+};
+
+/// A planar gripper that moves at a fixed height above the surface. Its origin
+/// G is the point of Fig. 3.2: the middle of the palm's face, x forward.
+struct SceneRobot {
+  std::string model = "planar_gripper";
+  double x = -0.3, y = 0.0;  ///< start of G, m
+  double rotation = 0.0;     ///< rad about z; 0 looks along +x
+  double opening = 0.085;    ///< m between the fingers
+};
+
+struct SceneTask {
+  std::string kind = "grasp";
+  std::string target;  ///< name of an object
+};
+
+/// Engine options; part of the world's identity.
+struct ScenePhysics {
+  double time_step = 0.002;  ///< s
+  int iterations = 50;       ///< Newton iterations at most
+  double tolerance = 1e-8;
+};
+
+struct Scene {
+  std::string name;
+  Surface surface;
+  SceneRobot robot;
+  std::vector<SceneObject> objects;
+  SceneTask task;
+  ScenePhysics physics;
+
+  /// Index of the target in objects, or -1.
+  int target() const;
+};
+
+/// Reads and checks a scene.
+/// Errors   kIo, kInvalidArgument; the message names file, line, field, got and wanted.
+Result<Scene> load_scene(const std::filesystem::path& file);
+Result<Scene> parse_scene(std::string_view yaml, const std::string& origin);
+
+/// The canonical text: equal scenes give equal text, and reading it back gives
+/// the same scene bit for bit.
+std::string to_yaml(const Scene& scene);
+
+/// Hash of the canonical text; the name of the world compiled from it.
+Hash scene_hash(const Scene& scene);
+
+/// Sizes and masses in range, names unique, target and robot known, nothing
+/// inside anything else, everything on the surface.
+Result<void> validate(const Scene& scene, const std::string& origin);
+
+/// Whether the footprints of two objects come closer than `gap` metres.
+bool overlap(const SceneObject& a, const SceneObject& b, double gap = 0.0);
+
+/// Whether an object is inside the robot's start pose, or closer than `gap` metres.
+bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap = 0.0);
+
+/// Parts of a State for this scene, and the state at its start: at rest.
+StateLayout layout_of(const Scene& scene);
+State initial_state(const Scene& scene);
+
+}  // namespace jostle::physics_pool

@@ -1,0 +1,153 @@
+#pragma once
+/// \file
+/// Strict reading of YAML files: every complaint names file, line, field, what
+/// was found and what was wanted, and an unknown key is a misspelt key.
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <yaml-cpp/yaml.h>
+
+#include <array>
+#include <initializer_list>
+#include <set>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+namespace jostle::yaml {
+
+/// Thrown by Fields; whoever parses a file turns it into an Error.
+struct Malformed {
+  std::string message;
+};
+
+/// One mapping of a file: hands out its fields and knows which were asked for.
+class Fields {
+ public:
+  Fields(YAML::Node node, std::string path, const std::string& origin)
+      : node_(std::move(node)), path_(std::move(path)), origin_(origin) {
+    if (!node_.IsMap()) fail(node_, path_, "wanted a mapping of keys to values");
+  }
+
+  template <class T>
+  void optional(const char* key, T& value) {
+    if (const YAML::Node node = take(key)) value = convert<T>(node, name(key));
+  }
+
+  template <class T>
+  void required(const char* key, T& value) {
+    const YAML::Node node = take(key);
+    if (!node) fail(node_, name(key), "missing, wanted " + wanted<T>());
+    value = convert<T>(node, name(key));
+  }
+
+  template <std::size_t N>
+  void numbers(const char* key, std::array<double, N>& values, bool is_required) {
+    const YAML::Node node = take(key);
+    if (!node) {
+      if (is_required) fail(node_, name(key), fmt::format("missing, wanted {} numbers", N));
+      return;
+    }
+    if (!node.IsSequence() || node.size() != N) {
+      fail(node, name(key), fmt::format("got {}, wanted {} numbers", describe(node), N));
+    }
+    for (std::size_t i = 0; i < N; ++i) {
+      values[i] = convert<double>(node[i], fmt::format("{}[{}]", name(key), i));
+    }
+  }
+
+  /// One of several words.
+  template <class E>
+  void choice(const char* key, E& value, std::initializer_list<std::pair<const char*, E>> words) {
+    const YAML::Node node = take(key);
+    if (!node) return;
+    const auto text = convert<std::string>(node, name(key));
+    std::string known;
+    for (const auto& [word, meaning] : words) {
+      if (text == word) {
+        value = meaning;
+        return;
+      }
+      known += (known.empty() ? "" : ", ") + std::string(word);
+    }
+    fail(node, name(key), fmt::format("got '{}', wanted one of: {}", text, known));
+  }
+
+  template <class Reader>
+  void section(const char* key, bool is_required, Reader read) {
+    const YAML::Node node = take(key);
+    if (node) {
+      Fields fields(node, name(key), origin_);
+      read(fields);
+      fields.finish();
+    } else if (is_required) {
+      fail(node_, name(key), "missing, wanted a mapping");
+    }
+  }
+
+  template <class Reader>
+  void list(const char* key, Reader read) {
+    const YAML::Node node = take(key);
+    if (!node || !node.IsSequence()) {
+      fail(node ? node : node_, name(key), "wanted a list");
+    }
+    for (std::size_t i = 0; i < node.size(); ++i) {
+      Fields fields(node[i], fmt::format("{}[{}]", name(key), i), origin_);
+      read(fields);
+      fields.finish();
+    }
+  }
+
+  /// Refuses keys nobody asked for.
+  void finish() {
+    for (const auto& entry : node_) {
+      const auto key = entry.first.as<std::string>();
+      if (!known_.contains(key)) {
+        fail(entry.first, name(key.c_str()),
+             fmt::format("unknown key, wanted one of: {}", fmt::join(known_, ", ")));
+      }
+    }
+  }
+
+ private:
+  template <class T>
+  static std::string wanted() {
+    if constexpr (std::is_same_v<T, std::string>) return "text";
+    else if constexpr (std::is_integral_v<T>) return "a whole number";
+    else return "a number";
+  }
+
+  static std::string describe(const YAML::Node& node) {
+    if (node.IsScalar()) return "'" + node.Scalar() + "'";
+    if (node.IsSequence()) return fmt::format("a list of {}", node.size());
+    return node.IsMap() ? "a mapping" : "nothing";
+  }
+
+  template <class T>
+  T convert(const YAML::Node& node, const std::string& field) const {
+    try {
+      return node.as<T>();
+    } catch (const YAML::Exception&) {
+      fail(node, field, fmt::format("got {}, wanted {}", describe(node), wanted<T>()));
+    }
+  }
+
+  [[noreturn]] void fail(const YAML::Node& node, const std::string& field,
+                         const std::string& problem) const {
+    throw Malformed{fmt::format("{}:{}: {}: {}", origin_, node.Mark().line + 1, field, problem)};
+  }
+
+  YAML::Node take(const char* key) {
+    known_.insert(key);
+    return node_[key] ? node_[key] : YAML::Node(YAML::NodeType::Undefined);
+  }
+
+  std::string name(const char* key) const { return path_.empty() ? key : path_ + "." + key; }
+
+  YAML::Node node_;
+  std::string path_;
+  const std::string& origin_;
+  std::set<std::string> known_;
+};
+
+}  // namespace jostle::yaml

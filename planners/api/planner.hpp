@@ -1,0 +1,57 @@
+#pragma once
+/// \file
+/// Planner: state in, plan out. Planners see a Pool, never an engine or a wire.
+
+#include <cstdint>
+#include <functional>
+#include <stop_token>
+#include <vector>
+
+#include "idl/types/result.hpp"
+#include "idl/types/state.hpp"
+#include "physics_pool/api/pool.hpp"
+
+namespace jostle::planners {
+
+using physics_pool::TimePoint;
+
+/// What is to be planned.
+struct Problem {
+  Hash world;               ///< planning world, known to the pool
+  State x0;
+  ControlSequence initial;  ///< candidate to improve, at least one step
+  int iterations = 50;      ///< I_max
+  std::uint64_t seed = 0;
+  std::uint32_t stream = 0; ///< first noise stream; one is used per iteration
+};
+
+/// The best sequence found, even if it does not reach the goal.
+struct Plan {
+  ControlSequence controls;  ///< u_0 … u_{n-1}
+  Trajectory states;         ///< x_0 … x_n, predicted
+  double cost = physics_pool::kInfinity;
+  bool grasped = false;      ///< target predicted in the hand at x_n
+  int iterations = 0;
+  std::uint64_t rollouts = 0;
+};
+
+/// Progress of a running plan, once per iteration.
+struct Progress {
+  int iteration = 0;  ///< 0: the initial candidate was scored
+  double cost = 0.0;  ///< of the best sequence so far
+  bool grasped = false;
+  std::uint64_t rollouts = 0;  ///< in this plan so far
+  const State* final_state = nullptr;  ///< of the best sequence; valid during the call
+};
+using OnProgress = std::function<void(const Progress&)>;
+
+/// Repeats  equal problems give bit-equal plans on any pool.
+/// Errors   those of Pool::run.
+class Planner {
+ public:
+  virtual ~Planner() = default;
+  virtual Result<Plan> plan(const Problem& problem, TimePoint deadline,
+                            std::stop_token stop = {}) = 0;
+};
+
+}  // namespace jostle::planners

@@ -1,0 +1,266 @@
+#include "planners/control/controller.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics_pool/scene/planar_gripper.hpp"
+
+namespace jostle::planners {
+namespace {
+
+using std::chrono::steady_clock;
+namespace hand = physics_pool::planar_gripper;
+
+struct Step {
+  double dx = 0.0, dy = 0.0;  // m, world frame
+};
+
+// From G to the point at pre-grasp distance in front of the target.
+Step to_pregrasp(const physics_pool::TaskGeometry& geometry, const State& x) {
+  const int q = geometry.layout.objects[static_cast<std::size_t>(geometry.layout.target)].q;
+  const double dx = x.q[q] - x.q[kJointX], dy = x.q[q + 1] - x.q[kJointY];
+  const double distance = std::hypot(dx, dy);
+  const double share = distance > 0 ? (distance - hand::kGraspDepth) / distance : 0.0;
+  return {share * dx, share * dy};
+}
+
+// One controller run: Alg. 2 and 3 share everything but when they plan.
+class Run {
+ public:
+  Run(const ControlSetup& setup, const ControlOptions& options, const OnEvent& on_event,
+      std::stop_token stop)
+      : setup_(setup),
+        options_(options),
+        on_event_(on_event),
+        stop_(std::move(stop)),
+        start_(steady_clock::now()),
+        deadline_(start_ + options.timeout) {}
+
+  Result<Outcome> go() {
+    auto ok = options_.method == ControlOptions::Method::kOnline ? online() : naive();
+    outcome_.total_time = steady_clock::now() - start_;
+    if (!ok) {
+      // Running out of time is how a task fails, not how the system does.
+      if (ok.error().code != Code::kDeadline) return ok.error();
+      outcome_.reason = fmt::format("timeout after {:.0f} s", outcome_.total_time.count());
+    }
+    notify(Phase::kDone);
+    return std::move(outcome_);
+  }
+
+ private:
+  // Alg. 2.
+  Result<void> online() {
+    if (auto ok = observe(); !ok) return ok;
+    if (auto ok = plan(straight(), options_.many_iterations); !ok) return ok;
+    while (!ended()) {
+      if (auto ok = act(); !ok) return ok;
+      if (ended()) break;
+      const bool deviated = state_deviation(layout(), plan_.states.front(), x_) > options_.deviation_threshold;
+      if (!plan_.grasped || deviated || plan_.controls.steps() < options_.min_steps) {
+        ControlSequence controls = plan_.controls;
+        controls.append(straight_step(plan_.states.back()));
+        ++outcome_.replans;
+        if (auto ok = plan(controls, options_.few_iterations); !ok) return ok;
+      }
+    }
+    return finish();
+  }
+
+  // Alg. 3.
+  Result<void> naive() {
+    if (auto ok = observe(); !ok) return ok;
+    while (!ended()) {
+      if (plan_made_) ++outcome_.replans;
+      if (auto ok = plan(straight(), options_.many_iterations); !ok) return ok;
+      while (!options_.plan_only && plan_.controls.steps() > 0) {
+        if (auto ok = act(); !ok) return ok;
+      }
+    }
+    return finish();
+  }
+
+  Result<void> plan(const ControlSequence& initial, int iterations) {
+    notify(Phase::kPlanning);
+    const auto before = steady_clock::now();
+    Problem problem{.world = setup_.world,
+                    .x0 = setup_.make_feasible ? setup_.make_feasible(x_) : x_,
+                    .initial = initial,
+                    .iterations = iterations,
+                    .seed = setup_.seed,
+                    .stream = stream_};
+    auto plan_result = setup_.planner.plan(problem, deadline_, stop_);
+    if (!plan_result) return plan_result.error();
+    plan_ = std::move(plan_result).value();
+    stream_ += static_cast<std::uint32_t>(iterations);
+    outcome_.rollouts += plan_.rollouts;
+    outcome_.iterations += plan_.iterations;
+    if (!plan_made_) {
+      plan_made_ = true;
+      outcome_.first_plan = plan_;
+      outcome_.plan_time = steady_clock::now() - before;
+    }
+    return {};
+  }
+
+  // Executes u_0, removes it and x_0 from the plan, observes.
+  Result<void> act() {
+    notify(Phase::kActing);
+    if (steady_clock::now() >= deadline_) return Error{Code::kDeadline, "task: out of time"};
+    if (auto ok = setup_.robot.execute(plan_.controls.step(0), options_.step_duration, stop_); !ok) {
+      return ok;
+    }
+    ++outcome_.actions;
+    plan_.controls.drop_first();
+    plan_.states.erase(plan_.states.begin());
+    return observe();
+  }
+
+  Result<void> observe() {
+    auto robot_result = setup_.robot.read();
+    if (!robot_result) return robot_result.error();
+    auto objects_result = setup_.objects.read();
+    if (!objects_result) return objects_result.error();
+    auto state_result = assemble_state(layout(), *robot_result, *objects_result);
+    if (!state_result) return state_result.error();
+    x_ = std::move(state_result).value();
+    outcome_.observed.push_back(x_);
+    in_hand_ = robot_result->object_in_hand.value_or(
+        physics_pool::grasped(setup_.geometry, x_, setup_.objective));
+    outcome_.dropped.clear();
+    for (const int i : physics_pool::dropped_objects(setup_.geometry, x_, setup_.objective.drop_height)) {
+      outcome_.dropped.push_back(layout().objects[static_cast<std::size_t>(i)].name);
+    }
+    return {};
+  }
+
+  bool ended() const {
+    return in_hand_ || !outcome_.dropped.empty() || (options_.plan_only && plan_made_);
+  }
+
+  Result<void> finish() {
+    if (!outcome_.dropped.empty()) {
+      outcome_.reason = fmt::format("dropped {}", fmt::join(outcome_.dropped, ", "));
+    } else if (in_hand_) {
+      outcome_.success = true;
+      outcome_.reason = "target grasped";
+      if (options_.close_hand) return close_hand();
+    } else {
+      outcome_.success = plan_.grasped;
+      outcome_.reason = plan_.grasped ? "plan reaches the target; not executed"
+                                      : "plan does not reach the target; not executed";
+    }
+    return {};
+  }
+
+  // Until the fingers have met the target or each other.
+  Result<void> close_hand() {
+    notify(Phase::kClosing);
+    std::vector<double> u(kControlAxes, 0.0);
+    u[kControlOpening] = -hand::kStroke / options_.step_duration;
+    if (auto ok = setup_.robot.execute(u, options_.step_duration, stop_); !ok) return ok;
+    return observe();
+  }
+
+  ControlSequence straight() const {
+    return straight_line(setup_.geometry, x_, options_.initial_steps, options_.step_duration);
+  }
+
+  // "Single straight step to target", Alg. 2 line 11, turning to face it.
+  std::vector<double> straight_step(const State& x) const {
+    const Step way = to_pregrasp(setup_.geometry, x);
+    const double distance = std::hypot(way.dx, way.dy);
+    const double speed = std::min(options_.straight_speed, distance / options_.step_duration);
+    std::vector<double> u(kControlAxes, 0.0);
+    if (distance > 0) {
+      u[kControlX] = speed * way.dx / distance;
+      u[kControlY] = speed * way.dy / distance;
+    }
+    return u;
+  }
+
+  void notify(Phase phase) const {
+    if (!on_event_) return;
+    on_event_({.phase = phase,
+               .actions = outcome_.actions,
+               .replans = outcome_.replans,
+               .plan = plan_made_ ? &plan_ : nullptr,
+               .observed = &x_});
+  }
+
+  const StateLayout& layout() const { return setup_.geometry.layout; }
+
+  const ControlSetup& setup_;
+  const ControlOptions& options_;
+  const OnEvent& on_event_;
+  std::stop_token stop_;
+  steady_clock::time_point start_, deadline_;
+  State x_;
+  bool in_hand_ = false;
+  Plan plan_;
+  bool plan_made_ = false;
+  std::uint32_t stream_ = 0;
+  Outcome outcome_;
+};
+
+}  // namespace
+
+Result<Outcome> run_controller(const ControlSetup& setup, const ControlOptions& options,
+                               const OnEvent& on_event, std::stop_token stop) {
+  return Run(setup, options, on_event, std::move(stop)).go();
+}
+
+ControlSequence straight_line(const physics_pool::TaskGeometry& geometry, const State& x, int steps,
+                              double step_duration) {
+  const Step way = to_pregrasp(geometry, x);
+  const double duration = steps * step_duration;
+  ControlSequence controls;
+  for (int t = 0; t < steps; ++t) {
+    controls.append(std::array{way.dx / duration, way.dy / duration, 0.0, 0.0});
+  }
+  return controls;
+}
+
+double state_deviation(const StateLayout& layout, const State& a, const State& b) {
+  double sum = 0.0;
+  const auto add = [&](std::size_t i) { sum += (a.q[i] - b.q[i]) * (a.q[i] - b.q[i]); };
+  for (std::size_t i = 0; i < layout.joints.size(); ++i) add(i);
+  for (const ObjectSlot& object : layout.objects) {
+    const auto q = static_cast<std::size_t>(object.q);
+    for (std::size_t i = q; i < q + 3; ++i) add(i);
+    double dot = 0.0;
+    for (std::size_t i = q + 3; i < q + 7; ++i) dot += a.q[i] * b.q[i];
+    const double angle = 2 * std::acos(std::min(std::abs(dot), 1.0));
+    sum += angle * angle;
+  }
+  return std::sqrt(sum);
+}
+
+Result<State> assemble_state(const StateLayout& layout, const robot_bridge::RobotReading& robot,
+                             const std::vector<perception::ObjectReading>& objects) {
+  if (robot.q.size() != layout.joints.size() || robot.v.size() != layout.joints.size()) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("robot: got {} positions and {} velocities, wanted {} joints",
+                             robot.q.size(), robot.v.size(), layout.joints.size())};
+  }
+  State x;
+  x.q = robot.q;
+  x.v = robot.v;
+  for (const ObjectSlot& slot : layout.objects) {
+    const auto found = std::ranges::find(objects, slot.name, &perception::ObjectReading::name);
+    if (found == objects.end()) {
+      return Error{Code::kInvalidArgument,
+                   fmt::format("objects: no measurement of '{}', wanted all {} objects of the scene",
+                               slot.name, layout.objects.size())};
+    }
+    x.q.insert(x.q.end(), found->position.begin(), found->position.end());
+    x.q.insert(x.q.end(), found->orientation.begin(), found->orientation.end());
+    x.v.insert(x.v.end(), found->linear.begin(), found->linear.end());
+    x.v.insert(x.v.end(), found->angular.begin(), found->angular.end());
+  }
+  return x;
+}
+
+}  // namespace jostle::planners

@@ -1,0 +1,44 @@
+#pragma once
+/// \file
+/// Physics-based stochastic trajectory optimization: Alg. 1 (PBSTO) and the
+/// update rules of Eq. 5.7 and 5.8.
+
+#include "planners/api/planner.hpp"
+
+namespace jostle::planners {
+
+struct PbstoOptions {
+  enum class Update {
+    kGreedy,        ///< the cheapest sample becomes the candidate (Eq. 5.7)
+    kCostWeighted,  ///< samples averaged with weights exp(-C/lambda) (Eq. 5.8)
+  };
+
+  int rollouts = 8;  ///< K per iteration; more find more and cost more
+  /// Standard deviations of the noise on x, y [m/s], rotation [rad/s] and
+  /// opening [m/s].
+  std::vector<double> sigma{0.04, 0.04, 0.25, 0.01};
+  std::vector<double> limit{0.15, 0.15, 0.8, 0.05};  ///< largest controls, same units
+  Update update = Update::kGreedy;
+  double lambda = 100.0;       ///< of Eq. 5.8, in units of cost; small is greedy
+  int min_steps = 2;           ///< n_min of Alg. 1
+  double step_duration = 1.0;  ///< Delta_t, s
+  bool stop_losers = true;     ///< never changes the plan, only its price
+  physics_pool::Objective objective;
+};
+
+class Pbsto final : public Planner {
+ public:
+  /// Keeps a reference to the pool, which must outlive it.
+  Pbsto(physics_pool::Pool& pool, PbstoOptions options, OnProgress on_progress = {});
+
+  Result<Plan> plan(const Problem& problem, TimePoint deadline, std::stop_token stop = {}) override;
+
+ private:
+  struct Run;
+
+  physics_pool::Pool& pool_;
+  PbstoOptions options_;
+  OnProgress on_progress_;
+};
+
+}  // namespace jostle::planners

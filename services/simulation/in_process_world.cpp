@@ -1,0 +1,46 @@
+#include "services/simulation/in_process_world.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace jostle::services {
+
+std::vector<perception::ObjectReading> object_readings(const StateLayout& layout, const State& x) {
+  std::vector<perception::ObjectReading> readings;
+  for (const ObjectSlot& slot : layout.objects) {
+    perception::ObjectReading reading{.name = slot.name};
+    const auto q = x.q.begin() + slot.q;
+    const auto v = x.v.begin() + slot.v;
+    std::copy_n(q, 3, reading.position.begin());
+    std::copy_n(q + 3, 4, reading.orientation.begin());
+    std::copy_n(v, 3, reading.linear.begin());
+    std::copy_n(v + 3, 3, reading.angular.begin());
+    readings.push_back(std::move(reading));
+  }
+  return readings;
+}
+
+Result<robot_bridge::RobotReading> SimulatedRobot::read() {
+  const State& x = world_.state();
+  return robot_bridge::RobotReading{
+      .q = {x.q.begin(), x.q.begin() + kRobotJoints},
+      .v = {x.v.begin(), x.v.begin() + kRobotJoints},
+      .object_in_hand = physics_pool::grasped(world_.world().geometry(), x, {})};
+}
+
+Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {
+  world_.begin(u);
+  const long steps = std::lround(duration / world_.world().time_step());
+  for (long i = 0; i < steps; ++i) {
+    if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped in mid-action"};
+    if (auto ok = world_.step(); !ok) return ok;
+  }
+  return {};
+}
+
+Result<std::vector<perception::ObjectReading>> SimulatedObjects::read() {
+  return object_readings(world_.world().geometry().layout,
+                         physics_pool::observed_state(world_.world().scene(), belief_, world_.state()));
+}
+
+}  // namespace jostle::services

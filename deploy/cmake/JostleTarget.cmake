@@ -19,9 +19,13 @@ function(jostle_interface name)
   target_link_libraries(jostle_${name} INTERFACE jostle_flags ${ARGN})
 endfunction()
 
+# All programs, without the tests.
+add_custom_target(programs)
+
 # jostle_program(NAME SOURCES … LINK …): build/bin/jostle_NAME.
 function(jostle_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   add_executable(jostle_${name} ${ARG_SOURCES})
   target_link_libraries(jostle_${name} PRIVATE jostle_flags ${ARG_LINK})
+  add_dependencies(programs jostle_${name})
 endfunction()

@@ -1,0 +1,62 @@
+#pragma once
+/// \file
+/// What participant, writers and readers share. For the .cpp files of this room.
+
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+#include <map>
+#include <mutex>
+
+#include "services/dds/participant.hpp"
+#include "services/dds/qos.hpp"
+
+namespace jostle::dds {
+
+/// Of a GUID's first 12 bytes, which all entities of a participant share.
+std::uint64_t participant_id(const eprosima::fastrtps::rtps::GUID_t& guid);
+
+class Participant::Core {
+ public:
+  Core(eprosima::fastdds::dds::DomainParticipant* participant, int domain);
+  ~Core();
+  Core(const Core&) = delete;
+  Core& operator=(const Core&) = delete;
+
+  /// A topic that is shared by all its writers and readers here; give it back.
+  /// Throws SetupError.
+  eprosima::fastdds::dds::Topic* acquire_topic(const std::string& name,
+                                               eprosima::fastdds::dds::TypeSupport type);
+  void release_topic(eprosima::fastdds::dds::Topic* topic);
+
+  eprosima::fastdds::dds::DomainParticipant* const participant;
+  eprosima::fastdds::dds::Publisher* const publisher;
+  eprosima::fastdds::dds::Subscriber* const subscriber;
+  const int domain;
+
+ private:
+  std::mutex mutex_;  // guards users_ and the creation of topics
+  std::map<std::string, int> users_;
+};
+
+/// The part of a Qos that writers and readers write the same way.
+template <class EndpointQos>
+void apply(const Qos& qos, EndpointQos& endpoint) {
+  using namespace eprosima::fastdds::dds;
+  endpoint.reliability().kind = qos.reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
+  endpoint.durability().kind = qos.latched ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
+  endpoint.history().kind = KEEP_LAST_HISTORY_QOS;
+  endpoint.history().depth = qos.depth;
+  endpoint.resource_limits().max_samples_per_instance = qos.depth;
+  endpoint.resource_limits().max_instances = qos.instances;
+  endpoint.resource_limits().max_samples = qos.depth * qos.instances;
+  // Room for one sample; the rest is allocated when it is needed.
+  endpoint.resource_limits().allocated_samples = 1;
+  endpoint.endpoint().history_memory_policy =
+      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  endpoint.data_sharing().off();
+}
+
+}  // namespace jostle::dds

@@ -1,0 +1,128 @@
+#include "services/dds/participant.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cstdlib>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+
+#include "idl/types/hash.hpp"
+#include "services/dds/core.hpp"
+
+namespace jostle::dds {
+namespace {
+
+using eprosima::fastdds::dds::DomainParticipant;
+using eprosima::fastdds::dds::DomainParticipantFactory;
+using eprosima::fastdds::dds::DomainParticipantQos;
+
+constexpr int kLargestDomain = 232;  // RTPS 2.2, 9.6.1.1: ports would pass 65535 beyond
+
+Result<int> choose_domain(const std::optional<int>& wanted) {
+  int domain = wanted.value_or(0);
+  std::string origin = "--domain";
+  if (const char* text = std::getenv("ROS_DOMAIN_ID"); !wanted && text && *text) {
+    origin = "ROS_DOMAIN_ID";
+    const std::string_view digits(text);
+    const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), domain);
+    if (end.ec != std::errc{} || end.ptr != digits.data() + digits.size()) domain = -1;
+    if (domain < 0) {
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}: got '{}', wanted 0 to {}", origin, text, kLargestDomain)};
+    }
+  }
+  if (domain < 0 || domain > kLargestDomain) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: got {}, wanted 0 to {}", origin, domain, kLargestDomain)};
+  }
+  return domain;
+}
+
+Result<Transport> choose_transport(const std::optional<Transport>& wanted) {
+  if (wanted) return *wanted;
+  const char* text = std::getenv("JOSTLE_DDS_TRANSPORT");
+  const std::string_view word = text ? text : "default";
+  if (word == "default") return Transport::kDefault;
+  if (word == "udp") return Transport::kUdp;
+  return Error{Code::kInvalidArgument,
+               fmt::format("JOSTLE_DDS_TRANSPORT: got '{}', wanted one of: default, udp", word)};
+}
+
+DomainParticipantQos make_qos(const std::string& name, Transport transport) {
+  DomainParticipantFactory::get_instance()->load_profiles();
+  DomainParticipantQos qos = DomainParticipantFactory::get_instance()->get_default_participant_qos();
+  qos.name(name);
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  discovery.leaseDuration = {1, 0};
+  discovery.leaseDuration_announcementperiod = {0, 250'000'000};
+  if (transport == Transport::kUdp) {
+    qos.transport().use_builtin_transports = false;
+    qos.transport().user_transports.assign(
+        1, std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
+  }
+  return qos;
+}
+
+}  // namespace
+
+std::uint64_t participant_id(const eprosima::fastrtps::rtps::GUID_t& guid) {
+  const auto* bytes = reinterpret_cast<const char*>(guid.guidPrefix.value);
+  return hash_of(std::string_view(bytes, sizeof guid.guidPrefix.value)).low;
+}
+
+Result<Participant> Participant::open(const ParticipantOptions& options) {
+  auto domain_result = choose_domain(options.domain);
+  if (!domain_result) return domain_result.error();
+  auto transport_result = choose_transport(options.transport);
+  if (!transport_result) return transport_result.error();
+  DomainParticipant* participant = DomainParticipantFactory::get_instance()->create_participant(
+      static_cast<std::uint32_t>(*domain_result), make_qos(options.name, *transport_result));
+  if (!participant) {
+    return Error{Code::kUnavailable,
+                 fmt::format("DDS domain {}: no participant could be created; check the network "
+                             "interfaces, /dev/shm and FASTRTPS_DEFAULT_PROFILES_FILE", *domain_result)};
+  }
+  return Participant(std::make_shared<Core>(participant, *domain_result));
+}
+
+int Participant::domain() const { return core_->domain; }
+std::uint64_t Participant::id() const { return participant_id(core_->participant->guid()); }
+
+Participant::Core::Core(DomainParticipant* owned, int domain_id)
+    : participant(owned),
+      publisher(owned->create_publisher(eprosima::fastdds::dds::PUBLISHER_QOS_DEFAULT)),
+      subscriber(owned->create_subscriber(eprosima::fastdds::dds::SUBSCRIBER_QOS_DEFAULT)),
+      domain(domain_id) {}
+
+Participant::Core::~Core() {
+  participant->delete_contained_entities();
+  DomainParticipantFactory::get_instance()->delete_participant(participant);
+}
+
+eprosima::fastdds::dds::Topic* Participant::Core::acquire_topic(
+    const std::string& name, eprosima::fastdds::dds::TypeSupport type) {
+  const std::lock_guard lock(mutex_);
+  auto* topic = static_cast<eprosima::fastdds::dds::Topic*>(participant->lookup_topicdescription(name));
+  if (!topic) {
+    type.register_type(participant);
+    topic = participant->create_topic(name, type.get_type_name(),
+                                      eprosima::fastdds::dds::TOPIC_QOS_DEFAULT);
+  }
+  if (!topic || topic->get_type_name() != type.get_type_name()) {
+    throw SetupError(fmt::format("topic {}: the middleware refused it with type {}", name,
+                                 type.get_type_name()));
+  }
+  ++users_[name];
+  return topic;
+}
+
+void Participant::Core::release_topic(eprosima::fastdds::dds::Topic* topic) {
+  const std::lock_guard lock(mutex_);
+  const auto user = users_.find(topic->get_name());
+  if (--user->second > 0) return;
+  users_.erase(user);
+  participant->delete_topic(topic);
+}
+
+}  // namespace jostle::dds

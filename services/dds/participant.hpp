@@ -1,0 +1,64 @@
+#pragma once
+/// \file
+/// Participant: this process in a DDS domain.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::dds {
+
+/// The middleware refused an entity: a wrong profile, or no memory. Thrown
+/// while a program sets itself up, never later; `main` reports it.
+struct SetupError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+enum class Transport {
+  kDefault,  ///< shared memory on one host, UDP between hosts, or as the XML profile says
+  kUdp,      ///< UDP only: beside foreign builds of Fast DDS, which share our segments' names
+};
+
+struct ParticipantOptions {
+  std::string name = "jostle";  ///< as tools list it
+  std::optional<int> domain;    ///< 0 to 232; else ROS_DOMAIN_ID, else 0
+  /// Else JOSTLE_DDS_TRANSPORT ("default" or "udp"), else kDefault.
+  std::optional<Transport> transport;
+};
+
+/// One per process: two can deadlock at shutdown (Fast DDS #6193). A copy is
+/// another handle to the same participant; writers and readers hold one, so
+/// everything may be destroyed in any order.
+///
+/// Transports and peers come from the default profile of the file that
+/// FASTRTPS_DEFAULT_PROFILES_FILE names, if any. The lease (1 s) and the
+/// announcement period (250 ms) are set here: the middleware's defaults give
+/// joins of 3 s and stalls of 20 s.
+///
+/// Threads  safe from any thread.
+class Participant {
+ public:
+  /// Errors   kInvalidArgument  the domain or the transport; says where it came from
+  ///          kUnavailable      the middleware refused
+  static Result<Participant> open(const ParticipantOptions& options);
+
+  int domain() const;
+
+  /// Names this participant in messages: the same number that
+  /// WriterBase::matched_participants() gives elsewhere.
+  std::uint64_t id() const;
+
+  class Core;
+  Core& core() const { return *core_; }
+
+ private:
+  explicit Participant(std::shared_ptr<Core> core) : core_(std::move(core)) {}
+
+  std::shared_ptr<Core> core_;
+};
+
+}  // namespace jostle::dds

@@ -1,0 +1,28 @@
+#pragma once
+/// \file
+/// What a topic promises, as one small value.
+
+namespace jostle::dds {
+
+/// A reader may not ask for more than the writer offers; both sides of a topic
+/// take theirs from `topics.hpp`, so they agree.
+struct Qos {
+  bool reliable = true;
+  bool latched = false;  ///< transient-local: late readers get the last samples
+  int depth = 10;        ///< samples kept per instance (keep-last)
+  int instances = 1;     ///< most keys of a keyed type; the middleware's default is 10
+};
+
+/// Commands and requests, each of which matters. The depth holds a burst to one
+/// peer, so that a slow peer is never the reason to block the writer.
+inline constexpr Qos kTask{.depth = 512};
+/// The last word on something, for whoever comes later.
+inline constexpr Qos kLatched{.latched = true, .depth = 1};
+/// Newest sample wins; a lost one is not worth repeating.
+inline constexpr Qos kStream{.reliable = false, .depth = 1};
+/// States that people and recorders follow.
+inline constexpr Qos kState{};
+/// One latched sample per key.
+inline constexpr Qos kCatalogue{.latched = true, .depth = 1, .instances = 4096};
+
+}  // namespace jostle::dds

@@ -1,0 +1,18 @@
+#pragma once
+/// \file
+/// A topic: name, type and promise in one value.
+
+#include <string>
+
+#include "services/dds/qos.hpp"
+#include "services/dds/types.hpp"
+
+namespace jostle::dds {
+
+template <class T>
+struct Topic {
+  std::string name;  ///< as on the wire: "rt/" before the name that ROS 2 shows
+  Qos qos;
+};
+
+}  // namespace jostle::dds

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
@@ -44,6 +45,38 @@ class Writer {
  private:
   std::string text_;
 };
+
+// Light, colours and sky: pictures only, no influence on motion.
+void write_looks(Writer& xml) {
+  xml.line(R"(<statistic center="0 0 0" extent="1"/>)");
+  xml.line(R"(<visual><global offwidth="1280" offheight="960"/><quality shadowsize="4096"/><map znear="0.02" zfar="20" shadowclip="1.2"/><headlight ambient="0.42 0.42 0.43" diffuse="0.22 0.22 0.22" specular="0.05 0.05 0.05"/></visual>)");
+  xml.line("<asset>");
+  xml.line(R"(<texture name="sky" type="skybox" builtin="gradient" rgb1="0.97 0.98 0.99" rgb2="0.86 0.89 0.92" width="256" height="256"/>)");
+  xml.line(R"(<material name="floor" rgba="0.80 0.82 0.84 1" specular="0" reflectance="0"/>)");
+  xml.line(R"(<material name="wood" rgba="0.84 0.77 0.66 1" specular="0.05"/>)");
+  xml.line(R"(<material name="steel" rgba="0.58 0.60 0.63 1" specular="0.4"/>)");
+  xml.line(R"(<material name="dark" rgba="0.40 0.41 0.44 1" specular="0.3"/>)");
+  xml.line(R"(<material name="arm" rgba="0.68 0.71 0.74 1" specular="0.3"/>)");
+  xml.line("</asset>");
+}
+
+// A camera at `eye` that looks at `at`, its picture's upper edge level.
+void write_camera(Writer& xml, const char* name, const std::array<double, 3>& eye,
+                  const std::array<double, 3>& at, double fovy_deg) {
+  const double x = eye[0] - at[0], y = eye[1] - at[1], z = eye[2] - at[2];
+  const double level = std::hypot(x, y);
+  xml.line(R"(<camera name="{}" pos="{} {} {}" xyaxes="{} {} 0 {} {} {}" fovy="{}"/>)", name, eye[0],
+           eye[1], eye[2], -y / level, x / level, -x * z / level, -y * z / level, level, fovy_deg);
+}
+
+// Cameras and light that fit the surface and the hand in front of it.
+void write_view(Writer& xml, const Surface& surface) {
+  const double scale = std::max(surface.size[0], surface.size[1]) / 0.6;
+  xml.line(R"(<light pos="-0.9 -0.1 2.0" dir="0.48 0.16 -1" directional="true" diffuse="0.55 0.55 0.54" specular="0.25 0.25 0.25"/>)");
+  write_camera(xml, "overview", {-0.15 * scale, -0.66 * scale, 1.00 * scale},
+               {-0.07 * scale, -0.025 * scale, 0.0}, 36);
+  write_camera(xml, "top", {-0.1 * scale, -0.01 * scale, 1.2 * scale}, {-0.1 * scale, 0.0, 0.0}, 40);
+}
 
 void write_surface(Writer& xml, const Surface& surface) {
   const double half_x = surface.size[0] / 2, half_y = surface.size[1] / 2;
@@ -131,18 +164,9 @@ std::string model_xml(const Scene& scene) {
   xml.line(R"(<option timestep="{}" iterations="{}" tolerance="{}" solver="Newton" jacobian="sparse" cone="pyramidal" integrator="Euler"/>)",
            scene.physics.time_step, scene.physics.iterations, scene.physics.tolerance);
   xml.line(R"(<size nconmax="{}" njmax="{}" nuser_geom="1"/>)", contacts, 4 * contacts + 8);
-  xml.line(R"(<visual><global offwidth="1280" offheight="960"/><quality shadowsize="2048"/><map znear="0.02"/><headlight ambient="0.35 0.35 0.35" diffuse="0.35 0.35 0.35" specular="0.1 0.1 0.1"/></visual>)");
-  xml.line("<asset>");
-  xml.line(R"(<texture name="sky" type="skybox" builtin="gradient" rgb1="0.93 0.95 0.97" rgb2="0.75 0.80 0.86" width="256" height="256"/>)");
-  xml.line(R"(<material name="floor" rgba="0.72 0.74 0.76 1" specular="0" reflectance="0"/>)");
-  xml.line(R"(<material name="wood" rgba="0.86 0.79 0.68 1" specular="0.1"/>)");
-  xml.line(R"(<material name="steel" rgba="0.45 0.47 0.50 1" specular="0.4"/>)");
-  xml.line(R"(<material name="dark" rgba="0.20 0.21 0.23 1" specular="0.3"/>)");
-  xml.line(R"(<material name="arm" rgba="0.62 0.66 0.70 1" specular="0.3"/>)");
-  xml.line("</asset>");
+  write_looks(xml);
   xml.line("<worldbody>");
-  xml.line(R"(<light pos="-0.6 -0.8 2.0" dir="0.3 0.4 -1" directional="true" diffuse="0.55 0.55 0.55"/>)");
-  xml.line(R"(<camera name="overview" pos="-0.55 -0.62 0.78" xyaxes="0.72 -0.69 0 0.44 0.46 0.77" fovy="45"/>)");
+  write_view(xml, scene.surface);
   write_surface(xml, scene.surface);
   write_robot(xml);
   for (std::size_t i = 0; i < bodies; ++i) {

@@ -1,0 +1,68 @@
+#include "physics_pool/render/decoration.hpp"
+
+#include <array>
+
+#include "physics_pool/scene/planar_gripper.hpp"
+
+namespace jostle::physics_pool {
+namespace {
+
+namespace hand = planar_gripper;
+
+using Vector = std::array<mjtNum, 3>;
+using Colour = std::array<float, 4>;
+
+constexpr Colour kPadColour{0.13f, 0.13f, 0.14f, 1.0f};
+constexpr Colour kFlangeColour{0.30f, 0.31f, 0.33f, 1.0f};
+constexpr Colour kJointColour{0.42f, 0.56f, 0.68f, 1.0f};
+
+// A shape fixed to a frame of the simulation.
+struct Ornament {
+  int type;      // mjtGeom
+  Vector size;   // half extents; of a cylinder radius and half height
+  Vector place;  // in the frame
+  Colour colour;
+};
+
+void add(const mjtNum* position, const mjtNum* rotation, const Ornament& ornament, mjvScene& scene) {
+  if (scene.ngeom >= scene.maxgeom) return;
+  Vector place;
+  mju_rotVecMat(place.data(), ornament.place.data(), rotation);
+  mju_addTo3(place.data(), position);
+  mjvGeom& geom = scene.geoms[scene.ngeom++];
+  mjv_initGeom(&geom, ornament.type, ornament.size.data(), place.data(), rotation, ornament.colour.data());
+  geom.category = mjCAT_DYNAMIC;
+  geom.objtype = mjOBJ_UNKNOWN;
+}
+
+void add_pad(const mjModel& model, const mjData& data, const char* finger, mjvScene& scene) {
+  const int geom = mj_name2id(&model, mjOBJ_GEOM, finger);
+  // Proud of the finger by a tenth of a millimetre, so that it shows.
+  const mjtNum* half = model.geom_size + 3 * geom;
+  add(data.geom_xpos + 3 * geom, data.geom_xmat + 9 * geom,
+      {mjGEOM_BOX, {0.4 * half[0], half[1] + 1e-4, half[2] + 1e-4}, {0.55 * half[0], 0, 0}, kPadColour}, scene);
+}
+
+void add_wrist(const mjModel& model, const mjData& data, mjvScene& scene) {
+  const int body = mj_name2id(&model, mjOBJ_BODY, "gripper");
+  const mjtNum* position = data.xpos + 3 * body;
+  const mjtNum* rotation = data.xmat + 9 * body;
+  const double top = hand::kPalmHeight / 2;
+  const auto cap = [&](double x, double radius, double half_height, const Colour& colour) {
+    add(position, rotation, {mjGEOM_CYLINDER, {radius, half_height, 0}, {x, 0, top}, colour}, scene);
+  };
+  cap(-hand::kPalmDepth - 0.045, 0.040, 0.012, kFlangeColour);
+  cap(-hand::kPalmDepth - 0.045, 0.032, 0.016, kJointColour);
+  cap(-hand::kPalmDepth - hand::kArmLength + 0.045, 0.040, 0.012, kFlangeColour);
+  cap(-hand::kPalmDepth - hand::kArmLength + 0.045, 0.032, 0.016, kJointColour);
+}
+
+}  // namespace
+
+void decorate(const mjModel& model, const mjData& data, mjvScene& scene) {
+  add_pad(model, data, "finger_left", scene);
+  add_pad(model, data, "finger_right", scene);
+  add_wrist(model, data, scene);
+}
+
+}  // namespace jostle::physics_pool

@@ -14,7 +14,17 @@ namespace {
 
 constexpr std::uint32_t kSceneStream = 0x5ce4e;
 constexpr std::uint32_t kPerturbStream = 0x9e57;
+constexpr std::uint32_t kMeasurementStream = 0x3ea5;
 constexpr int kPlacementTries = 20000;
+
+// Footnote 2 of Ch. 3, low uncertainty.
+constexpr double kPositionSigma = 0.005;  // m
+constexpr double kYawSigma = 0.005;       // rad
+constexpr double kSizeSigma = 0.005;      // m
+constexpr double kMassSigma = 0.01;       // kg
+constexpr double kFrictionSigma = 0.005;
+
+double scale_of(Uncertainty level) { return static_cast<int>(level); }  // 0, 1, 2, 3
 
 void draw_body(CounterStream& random, SceneObject& object) {
   if (object.shape == Shape::kBox) {
@@ -97,11 +107,11 @@ Result<Uncertainty> parse_uncertainty(std::string_view word) {
 
 const char* to_string(Uncertainty level) { return kLevels[static_cast<std::size_t>(level)].first; }
 
-double velocity_noise(Uncertainty level) { return 0.003 * static_cast<int>(level); }
+double velocity_noise(Uncertainty level) { return 0.003 * scale_of(level); }
 
 Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed) {
   if (level == Uncertainty::kNone) return execution;
-  const double scale = static_cast<int>(level);  // 1, 2, 3
+  const double scale = scale_of(level);
   CounterStream random(seed, kPerturbStream);
   Scene belief = execution;
   belief.objects.clear();
@@ -115,14 +125,14 @@ Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed) {
       };
       const double half_x = execution.surface.size[0] / 2, half_y = execution.surface.size[1] / 2;
       object = truth;
-      for (double& extent : object.size) extent = noisy(extent, 0.005, extent / 2);
-      object.radius = noisy(object.radius, 0.005, object.radius / 2);
-      object.height = noisy(object.height, 0.005, object.height / 2);
-      object.mass = noisy(object.mass, 0.01, object.mass / 2);
-      object.friction = noisy(object.friction, 0.005, object.friction / 2);
-      object.x = std::clamp(noisy(object.x, 0.005, -half_x), -half_x, half_x);
-      object.y = std::clamp(noisy(object.y, 0.005, -half_y), -half_y, half_y);
-      object.yaw = random.normal(object.yaw, shrink * scale * 0.005);
+      for (double& extent : object.size) extent = noisy(extent, kSizeSigma, extent / 2);
+      object.radius = noisy(object.radius, kSizeSigma, object.radius / 2);
+      object.height = noisy(object.height, kSizeSigma, object.height / 2);
+      object.mass = noisy(object.mass, kMassSigma, object.mass / 2);
+      object.friction = noisy(object.friction, kFrictionSigma, object.friction / 2);
+      object.x = std::clamp(noisy(object.x, kPositionSigma, -half_x), -half_x, half_x);
+      object.y = std::clamp(noisy(object.y, kPositionSigma, -half_y), -half_y, half_y);
+      object.yaw = random.normal(object.yaw, shrink * scale * kYawSigma);
       shrink *= 0.98;
     } while (shrink > 1e-3 && !is_free(belief, object, 0.0));
     belief.objects.push_back(object);
@@ -130,25 +140,30 @@ Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed) {
   return belief;
 }
 
-State observed_state(const Scene& execution, const Scene& belief, const State& truth) {
+State observed_state(const Scene& execution, const Scene& belief, const State& truth,
+                     Uncertainty level, const MeasurementIndex& index) {
+  if (level == Uncertainty::kNone) return truth;
   State seen = truth;
   const StateLayout layout = layout_of(execution);
   for (std::size_t i = 0; i < layout.objects.size(); ++i) {
-    const SceneObject& real = execution.objects[i];
-    const SceneObject& believed = belief.objects[i];
+    const auto noise = [&](std::uint32_t axis, double sigma) {
+      return scale_of(level) * sigma *
+             standard_normal(index.seed, {.stream = kMeasurementStream,
+                                          .sample = index.count,
+                                          .step = static_cast<std::uint32_t>(i),
+                                          .axis = axis});
+    };
     double* p = &seen.q[static_cast<std::size_t>(layout.objects[i].q)];
-    p[0] += believed.x - real.x;
-    p[1] += believed.y - real.y;
-    p[2] += believed.rest_height() - real.rest_height();
-    // q_seen = yaw(offset) * q_true
-    const double half = (believed.yaw - real.yaw) / 2, c = std::cos(half), s = std::sin(half);
+    p[0] += noise(0, kPositionSigma);
+    p[1] += noise(1, kPositionSigma);
+    p[2] += belief.objects[i].rest_height() - execution.objects[i].rest_height();
+    // q_seen = yaw(noise) * q_true
+    const double half = noise(2, kYawSigma) / 2, c = std::cos(half), s = std::sin(half);
     const std::array<double, 4> q{p[3], p[4], p[5], p[6]};
-    if (half != 0.0) {
-      p[3] = c * q[0] - s * q[3];
-      p[4] = c * q[1] - s * q[2];
-      p[5] = c * q[2] + s * q[1];
-      p[6] = c * q[3] + s * q[0];
-    }
+    p[3] = c * q[0] - s * q[3];
+    p[4] = c * q[1] - s * q[2];
+    p[5] = c * q[2] + s * q[1];
+    p[6] = c * q[3] + s * q[0];
   }
   return seen;
 }

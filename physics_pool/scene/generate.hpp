@@ -42,12 +42,20 @@ double velocity_noise(Uncertainty level);
 /// 0.005 at low; twice and three times that at medium and high). What the
 /// thesis calls variances are standard deviations here. Believed objects never
 /// overlap: a draw that would is made again, with less noise after each try.
+/// What is measured during a run gets noise of its own, see observed_state.
 Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed);
 
-/// The state of the execution world as the planner's instruments show it: each
-/// object off by what its pose in `belief` was off at the start, and at rest on
-/// the surface with the height it is believed to have. The offset is constant
-/// during a run, like a calibration error; the robot's joints are exact.
-State observed_state(const Scene& execution, const Scene& belief, const State& truth);
+/// Which measurement of which run: equal indices give equal noise.
+struct MeasurementIndex {
+  std::uint64_t seed = 0;
+  std::uint32_t count = 0;  ///< measurements made before this one
+};
+
+/// The state of the execution world as the planner's instruments show it: fresh
+/// Gaussian noise on every object's x, y and yaw (the pose noise of footnote 2
+/// at this level), and every object as high above the surface as its believed
+/// shape puts it. The robot's joints are exact.
+State observed_state(const Scene& execution, const Scene& belief, const State& truth,
+                     Uncertainty level, const MeasurementIndex& index);
 
 }  // namespace jostle::physics_pool

@@ -1,9 +1,7 @@
 #include "services/config/parameters.hpp"
 
-#include <fstream>
-#include <sstream>
-
 #include "physics_pool/scene/yaml_fields.hpp"
+#include "services/support/files.hpp"
 
 namespace jostle::services {
 namespace {
@@ -82,12 +80,9 @@ Result<Parameters> parse_parameters(std::string_view text, const std::string& or
 }
 
 Result<Parameters> load_parameters(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) {
-    return Error{Code::kIo, fmt::format("{}: cannot be read, wanted a file of parameters", file.string())};
-  }
-  return parse_parameters(text.str(), file.string());
+  auto text_result = read_text(file);
+  if (!text_result) return text_result.error();
+  return parse_parameters(*text_result, file.string());
 }
 
 }  // namespace jostle::services

@@ -39,8 +39,10 @@ Result<void> SimulatedRobot::execute(std::span<const double> u, double duration,
 }
 
 Result<std::vector<perception::ObjectReading>> SimulatedObjects::read() {
-  return object_readings(world_.world().geometry().layout,
-                         physics_pool::observed_state(world_.world().scene(), belief_, world_.state()));
+  const State seen = physics_pool::observed_state(world_.world().scene(), belief_, world_.state(),
+                                                  level_, index_);
+  ++index_.count;
+  return object_readings(world_.world().geometry().layout, seen);
 }
 
 }  // namespace jostle::services

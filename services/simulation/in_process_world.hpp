@@ -26,18 +26,21 @@ class SimulatedRobot final : public robot_bridge::Robot {
   physics_pool::ExecutionWorld& world_;
 };
 
-/// Sees the objects of an execution world as far off as the planning scene
-/// `belief` is.
+/// Sees the objects of an execution world as observed_state does; a measurement
+/// per reading.
 class SimulatedObjects final : public perception::ObjectSource {
  public:
-  SimulatedObjects(const physics_pool::ExecutionWorld& world, physics_pool::Scene belief)
-      : world_(world), belief_(std::move(belief)) {}
+  SimulatedObjects(const physics_pool::ExecutionWorld& world, physics_pool::Scene belief,
+                   physics_pool::Uncertainty level, std::uint64_t seed)
+      : world_(world), belief_(std::move(belief)), level_(level), index_{.seed = seed} {}
 
   Result<std::vector<perception::ObjectReading>> read() override;
 
  private:
   const physics_pool::ExecutionWorld& world_;
   physics_pool::Scene belief_;
+  physics_pool::Uncertainty level_;
+  physics_pool::MeasurementIndex index_;
 };
 
 }  // namespace jostle::services

@@ -1,0 +1,43 @@
+#include "services/support/files.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
+
+namespace jostle::services {
+
+namespace fs = std::filesystem;
+
+fs::path program_folder() { return fs::read_symlink("/proc/self/exe").parent_path(); }
+
+fs::path data_file(const std::string& name) {
+  return program_folder().parent_path() / "share" / "jostle" / name;
+}
+
+Result<std::string> read_text(const fs::path& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  if (!in || !(text << in.rdbuf())) {
+    return Error{Code::kIo, fmt::format("{}: cannot be read", file.string())};
+  }
+  return text.str();
+}
+
+Result<void> write_text(const fs::path& file, const std::string& text) {
+  std::error_code ignored;
+  if (file.has_parent_path()) fs::create_directories(file.parent_path(), ignored);
+  const fs::path draft = file.string() + fmt::format(".{}", ::getpid());
+  std::ofstream out(draft);
+  out << text;
+  out.close();
+  std::error_code problem;
+  if (out) fs::rename(draft, file, problem);
+  if (out && !problem) return {};
+  fs::remove(draft, ignored);
+  return Error{Code::kIo, fmt::format("{}: cannot be written{}", file.string(),
+                                      problem ? ": " + problem.message() : "")};
+}
+
+}  // namespace jostle::services

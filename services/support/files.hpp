@@ -1,0 +1,26 @@
+#pragma once
+/// \file
+/// Where programs find what lies beside them.
+
+#include <filesystem>
+#include <string>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::services {
+
+/// The folder this program was started from, links resolved.
+std::filesystem::path program_folder();
+
+/// A data file of the project, `name` such as "experiments/chapter3.yaml":
+/// looked for below ../share/jostle of the program's folder.
+std::filesystem::path data_file(const std::string& name);
+
+/// Error kIo naming the file.
+Result<std::string> read_text(const std::filesystem::path& file);
+
+/// Makes missing folders; replaces the file in one step, so that a reader
+/// never sees half of it. Error kIo naming the file.
+Result<void> write_text(const std::filesystem::path& file, const std::string& text);
+
+}  // namespace jostle::services

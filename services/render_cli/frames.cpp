@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
+
+#include "services/support/files.hpp"
 
 namespace jostle::services {
 namespace {
@@ -66,12 +67,10 @@ class Reader {
 }  // namespace
 
 Result<Frames> load_frames(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in) {
-    return Error{Code::kIo, fmt::format("{}: cannot be read, wanted a file of states", file.string())};
-  }
+  const auto text_result = read_text(file);
+  if (!text_result) return text_result.error();
   try {
-    return Reader(file.string()).read(json::parse(in));
+    return Reader(file.string()).read(json::parse(*text_result));
   } catch (const json::exception& error) {
     return Error{Code::kInvalidArgument, fmt::format("{}: not JSON: {}", file.string(), error.what())};
   }

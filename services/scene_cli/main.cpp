@@ -4,10 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
 
 #include "physics_pool/scene/generate.hpp"
 #include "physics_pool/scene/scene.hpp"
+#include "services/support/files.hpp"
 
 namespace jostle::services {
 namespace {
@@ -31,9 +31,7 @@ Result<void> write(const std::string& file, const std::string& text) {
     std::fwrite(text.data(), 1, text.size(), stdout);
     return {};
   }
-  std::ofstream out(file);
-  if (out << text && out.flush()) return {};
-  return Error{Code::kIo, fmt::format("{}: cannot be written, wanted a file in an existing folder", file)};
+  return write_text(file, text);
 }
 
 Result<void> generate(const Arguments& arguments) {

@@ -1,0 +1,91 @@
+#include "services/launcher/programs.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <string_view>
+#include <utility>
+
+namespace jostle::services {
+namespace {
+
+constexpr std::string_view kPrefix = "jostle_";
+
+constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kPurposes{{
+    {"bag", "inspect, cut, merge and convert recordings"},
+    {"bench", "measure physics, pools and planners on this machine"},
+    {"bridge", "drive a robot, or a fake one, from DDS"},
+    {"coordinator", "plan and re-plan with a pool of workers"},
+    {"doctor", "say what is wrong with this machine, and the remedy"},
+    {"experiment", "run a study of the thesis and write its figure or table"},
+    {"perceive", "turn camera or motion capture measurements into object poses"},
+    {"play", "play a recording back"},
+    {"record", "record topics"},
+    {"render", "draw states of a scene as a picture"},
+    {"run", "start everything for a scene on this machine"},
+    {"scene", "make, check, disturb and show scene files"},
+    {"sim", "simulate the world in which actions happen"},
+    {"train-coarse", "train the learned coarse model"},
+    {"view", "watch live in a browser"},
+    {"worker", "simulate rollouts for whoever asks"},
+}};
+
+std::string purpose_of(const std::string& name) {
+  const auto* found = std::ranges::find(kPurposes, name, [](const auto& entry) { return entry.first; });
+  return found == kPurposes.end() ? "" : std::string(found->second);
+}
+
+// Levenshtein's distance, one row at a time.
+std::size_t edits(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::filesystem::path program_file(const std::filesystem::path& folder, const std::string& name) {
+  std::string file = std::string(kPrefix) + name;
+  std::ranges::replace(file, '-', '_');
+  return folder / file;
+}
+
+std::vector<Program> installed_programs(const std::filesystem::path& folder) {
+  std::vector<Program> programs;
+  std::error_code ignored;  // an unreadable folder holds no programs
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    std::string name = entry.path().filename().string();
+    if (!name.starts_with(kPrefix) || !entry.is_regular_file(ignored)) continue;
+    if (access(entry.path().c_str(), X_OK) != 0) continue;
+    name.erase(0, kPrefix.size());
+    std::ranges::replace(name, '_', '-');
+    programs.push_back({.name = name, .purpose = purpose_of(name)});
+  }
+  std::ranges::sort(programs, {}, &Program::name);
+  return programs;
+}
+
+std::string nearest(const std::vector<Program>& programs, const std::string& name) {
+  // Every second letter wrong is no misspelling any more.
+  std::size_t fewest = name.size() / 2 + 1;
+  std::string found;
+  for (const Program& program : programs) {
+    const std::size_t needed = edits(name, program.name);
+    if (needed >= fewest) continue;
+    fewest = needed;
+    found = program.name;
+  }
+  return found;
+}
+
+}  // namespace jostle::services

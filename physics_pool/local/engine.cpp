@@ -42,4 +42,6 @@ void install_engine_handlers() {
   });
 }
 
+const char* engine_version() { return mj_versionString(); }
+
 }  // namespace jostle::physics_pool

@@ -21,6 +21,9 @@ class EngineError : public std::runtime_error {
 /// Installs the error, warning and contact handlers; safe to call repeatedly.
 void install_engine_handlers();
 
+/// Of the MuJoCo library that is loaded, such as "2.2.2".
+const char* engine_version();
+
 struct ModelDeleter {
   void operator()(mjModel* model) const { mj_deleteModel(model); }
 };

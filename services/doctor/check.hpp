@@ -1,0 +1,22 @@
+#pragma once
+/// \file
+/// What one look at the machine found.
+
+#include <string>
+
+namespace jostle::services {
+
+enum class Verdict {
+  kOk,
+  kWarn,  ///< works, yet slower or in fewer places than it could
+  kFail,  ///< Jostle cannot work like this
+};
+
+struct Check {
+  std::string name;     ///< what was looked at
+  Verdict verdict = Verdict::kOk;
+  std::string finding;  ///< what was found, with numbers
+  std::string remedy;   ///< what to do; empty if ok
+};
+
+}  // namespace jostle::services

@@ -11,8 +11,7 @@
 namespace jostle::services {
 namespace {
 
-constexpr std::string_view kPrefix = "jostle_";
-
+// Sorted by name.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kPurposes{{
     {"bag", "inspect, cut, merge and convert recordings"},
     {"bench", "measure physics, pools and planners on this machine"},
@@ -32,11 +31,6 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kPurpose
     {"worker", "simulate rollouts for whoever asks"},
 }};
 
-std::string purpose_of(const std::string& name) {
-  const auto* found = std::ranges::find(kPurposes, name, [](const auto& entry) { return entry.first; });
-  return found == kPurposes.end() ? "" : std::string(found->second);
-}
-
 // Levenshtein's distance, one row at a time.
 std::size_t edits(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -55,23 +49,17 @@ std::size_t edits(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::filesystem::path program_file(const std::filesystem::path& folder, const std::string& name) {
-  std::string file = std::string(kPrefix) + name;
+  std::string file = "jostle_" + name;
   std::ranges::replace(file, '-', '_');
   return folder / file;
 }
 
 std::vector<Program> installed_programs(const std::filesystem::path& folder) {
   std::vector<Program> programs;
-  std::error_code ignored;  // an unreadable folder holds no programs
-  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
-    std::string name = entry.path().filename().string();
-    if (!name.starts_with(kPrefix) || !entry.is_regular_file(ignored)) continue;
-    if (access(entry.path().c_str(), X_OK) != 0) continue;
-    name.erase(0, kPrefix.size());
-    std::ranges::replace(name, '_', '-');
-    programs.push_back({.name = name, .purpose = purpose_of(name)});
+  for (const auto& [name, purpose] : kPurposes) {
+    if (access(program_file(folder, std::string(name)).c_str(), X_OK) != 0) continue;
+    programs.push_back({.name = std::string(name), .purpose = std::string(purpose)});
   }
-  std::ranges::sort(programs, {}, &Program::name);
   return programs;
 }
 

@@ -71,7 +71,9 @@ void write_camera(Writer& xml, const char* name, const std::array<double, 3>& ey
 
 // Cameras and light that fit the surface and the hand in front of it.
 void write_view(Writer& xml, const Surface& surface) {
-  const double scale = std::max(surface.size[0], surface.size[1]) / 0.6;
+  // The cameras were placed for the table of Sec. 3.3.1; a shelf's walls need more room.
+  const double walls = surface.kind == Surface::Kind::kShelf ? 0.06 : 0.0;
+  const double scale = (std::max(surface.size[0], surface.size[1]) + walls) / 0.6;
   xml.line(R"(<light pos="-0.9 -0.1 2.0" dir="0.48 0.16 -1" directional="true" diffuse="0.55 0.55 0.54" specular="0.25 0.25 0.25"/>)");
   write_camera(xml, "overview", {-0.15 * scale, -0.66 * scale, 1.00 * scale},
                {-0.07 * scale, -0.025 * scale, 0.0}, 36);

@@ -1,0 +1,116 @@
+#pragma once
+/// \file
+/// Robot, ObjectSource and Planner without physics: the hand moves exactly as
+/// told, objects stand still, and tests step in where they like.
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "perception/api/object_source.hpp"
+#include "physics_pool/objective/terms.hpp"
+#include "planners/api/planner.hpp"
+#include "robot_bridge/api/robot.hpp"
+
+namespace jostle::tests {
+
+/// x after u for `duration` seconds if nothing resists.
+inline State moved(State x, std::span<const double> u, double duration) {
+  x.q[kJointX] += u[kControlX] * duration;
+  x.q[kJointY] += u[kControlY] * duration;
+  x.q[kJointRotation] += u[kControlRotation] * duration;
+  x.q[kJointLeft] += u[kControlOpening] * duration / 2;
+  x.q[kJointRight] += u[kControlOpening] * duration / 2;
+  return x;
+}
+
+class KinematicRobot final : public robot_bridge::Robot {
+ public:
+  explicit KinematicRobot(State& x) : x_(x) {}
+
+  Result<robot_bridge::RobotReading> read() override {
+    if (read_error) return *read_error;
+    return robot_bridge::RobotReading{.q = {x_.q.begin(), x_.q.begin() + kRobotJoints},
+                                      .v = std::vector<double>(kRobotJoints, 0.0),
+                                      .object_in_hand = object_in_hand};
+  }
+
+  Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override {
+    if (execute_error) return *execute_error;
+    if (stop.stop_requested()) return Error{Code::kCancelled, "robot: cancelled"};
+    executed.emplace_back(u.begin(), u.end());
+    durations.push_back(duration);
+    x_ = moved(x_, u, duration);
+    if (after_execute) after_execute(x_, static_cast<int>(executed.size()));
+    return {};
+  }
+
+  std::vector<std::vector<double>> executed;
+  std::vector<double> durations;
+  std::optional<bool> object_in_hand;
+  std::optional<Error> read_error, execute_error;
+  std::function<void(State&, int actions)> after_execute;
+
+ private:
+  State& x_;
+};
+
+class KinematicObjects final : public perception::ObjectSource {
+ public:
+  KinematicObjects(const StateLayout& layout, const State& x) : layout_(layout), x_(x) {}
+
+  Result<std::vector<perception::ObjectReading>> read() override {
+    if (error) return *error;
+    std::vector<perception::ObjectReading> readings;
+    // Last object first: the order must not matter.
+    for (auto slot = layout_.objects.rbegin(); slot != layout_.objects.rend(); ++slot) {
+      if (slot->name == hidden) continue;
+      perception::ObjectReading reading{.name = slot->name};
+      std::copy_n(x_.q.begin() + slot->q, 3, reading.position.begin());
+      std::copy_n(x_.q.begin() + slot->q + 3, 4, reading.orientation.begin());
+      std::copy_n(x_.v.begin() + slot->v, 3, reading.linear.begin());
+      std::copy_n(x_.v.begin() + slot->v + 3, 3, reading.angular.begin());
+      readings.push_back(reading);
+    }
+    return readings;
+  }
+
+  std::string hidden;
+  std::optional<Error> error;
+
+ private:
+  const StateLayout& layout_;
+  const State& x_;
+};
+
+/// Predicts the initial controls kinematically and improves nothing.
+class KinematicPlanner final : public planners::Planner {
+ public:
+  Result<planners::Plan> plan(const planners::Problem& problem, planners::TimePoint deadline,
+                              std::stop_token = {}) override {
+    problems.push_back(problem);
+    deadlines.push_back(deadline);
+    if (error) return *error;
+    planners::Plan plan;
+    plan.controls = problem.initial;
+    plan.states = {problem.x0};
+    for (int t = 0; t < plan.controls.steps(); ++t) {
+      plan.states.push_back(moved(plan.states.back(), plan.controls.step(t), step_duration));
+    }
+    plan.cost = 1.0;
+    plan.grasped = predicts_grasp;
+    plan.iterations = problem.iterations;
+    plan.rollouts = 10;
+    if (change) change(plan, static_cast<int>(problems.size()));
+    return plan;
+  }
+
+  double step_duration = 1.0;
+  bool predicts_grasp = true;
+  std::optional<Error> error;
+  std::function<void(planners::Plan&, int plans)> change;
+  std::vector<planners::Problem> problems;
+  std::vector<planners::TimePoint> deadlines;
+};
+
+}  // namespace jostle::tests

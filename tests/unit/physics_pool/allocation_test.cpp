@@ -1,0 +1,100 @@
+// The hot loop must not allocate: neither ours nor the engine's.
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "physics_pool/local/simulator.hpp"
+#include "tests/support/scenes.hpp"
+
+namespace {
+
+std::atomic<long> allocations{0};
+
+void* counted(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::aligned_alloc(64, (size + 63) / 64 * 64)) return memory;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new[](std::size_t size) { return counted(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace jostle::physics_pool {
+namespace {
+
+void* counted_by_engine(std::size_t size) { return counted(size); }
+
+class AllocationTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    mju_user_malloc = counted_by_engine;
+    mju_user_free = std::free;
+  }
+  static void TearDownTestSuite() {
+    mju_user_malloc = nullptr;
+    mju_user_free = nullptr;
+  }
+};
+
+TEST_F(AllocationTest, CounterSeesBothKinds) {
+  long before = allocations;
+  delete new int(3);
+  EXPECT_EQ(allocations, before + 1);
+  before = allocations;
+  mju_free(mju_malloc(100));
+  EXPECT_EQ(allocations, before + 1);
+}
+
+TEST_F(AllocationTest, AdvanceAllocatesNothingAfterConstruction) {
+  Scene scene = tests::three_objects();
+  scene.robot.x = -0.15;
+  const WorldPtr world = std::move(World::compile(scene)).value();
+  Simulator sut(world);
+  const State start = initial_state(scene);
+  State x = start;
+  const std::array<double, 4> u{0.1, 0.05, 0.2, -0.01};
+  const long before = allocations;
+  for (int i = 0; i < 10; ++i) (void)sut.advance(x, u, 100);
+  EXPECT_EQ(allocations, before);
+  EXPECT_NE(x, start);
+}
+
+TEST_F(AllocationTest, AdvanceAllocatesNothingWithAnInterruptOfTwoPointers) {
+  const Scene scene = tests::target_only();
+  const WorldPtr world = std::move(World::compile(scene)).value();
+  Simulator sut(world);
+  State x = initial_state(scene);
+  const std::array<double, 4> u{};
+  int asked = 0, more = 0;
+  const long before = allocations;
+  (void)sut.advance(x, u, 100, [&asked, &more] { return ++asked + more < 0; });
+  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(asked, 100);
+}
+
+TEST_F(AllocationTest, ScoringAStepAllocatesNothing) {
+  const Scene scene = tests::three_objects();
+  const TaskGeometry geometry(scene);
+  const State a = initial_state(scene);
+  State b = a;
+  b.q[6] += 0.3;
+  const std::array<double, 4> u{0.1, 0, 0, 0}, none{};
+  const Objective objective;
+  const long before = allocations;
+  const double cost = running_cost(geometry, objective, none, u, a, b) +
+                      goal_cost(geometry, b, objective.angle) + grasped(geometry, b, objective);
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(cost, 0.0);
+}
+
+}  // namespace
+}  // namespace jostle::physics_pool

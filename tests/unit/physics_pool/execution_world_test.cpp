@@ -1,0 +1,85 @@
+#include "physics_pool/local/execution_world.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "tests/support/scenes.hpp"
+
+namespace jostle::physics_pool {
+namespace {
+
+constexpr int kSteps = 250;  // half a second
+
+WorldPtr compiled() {
+  Scene scene = tests::three_objects();
+  scene.robot.x = -0.15;
+  return std::move(World::compile(scene)).value();
+}
+
+State after(ExecutionWorld& sut, const std::vector<double>& u, int steps = kSteps) {
+  sut.begin(u);
+  for (int i = 0; i < steps; ++i) {
+    const auto ok = sut.step();
+    if (!ok) ADD_FAILURE() << ok.error().message;
+  }
+  return sut.state();
+}
+
+TEST(ExecutionWorld, EndsActionsBitEqualToThePlannersModelWithoutNoise) {
+  const WorldPtr world = compiled();
+  ExecutionWorld sut(world, 0.0, 1);
+  Simulator model(world);
+  State x = initial_state(world->scene());
+  EXPECT_EQ(sut.state(), x);
+  for (const std::vector<double>& u : {std::vector<double>{0.1, 0.1, 0.3, 0}, {0.05, -0.1, 0, -0.02}}) {
+    (void)model.advance(x, u, kSteps);
+    EXPECT_EQ(after(sut, u), x);
+  }
+  EXPECT_NEAR(sut.time(), 2 * kSteps * world->time_step(), 1e-12);
+}
+
+TEST(ExecutionWorld, RepeatsForEqualSeedsAndDiffersForOthers) {
+  const WorldPtr world = compiled();
+  const std::vector<double> u{0.1, 0.1, 0.3, 0};
+  ExecutionWorld a(world, 0.003, 1), b(world, 0.003, 1), c(world, 0.003, 2);
+  const State x = after(a, u);
+  EXPECT_EQ(after(b, u), x);
+  EXPECT_NE(after(c, u), x);
+}
+
+// Eq. 3.3: a robot at rest has, after one step, a velocity of one draw.
+TEST(ExecutionWorld, AddsVelocityNoiseOfTheGivenSigmaEveryStep) {
+  Scene scene = tests::target_only();
+  scene.robot = {.x = -0.8};
+  const WorldPtr world = std::move(World::compile(scene)).value();
+  constexpr double kSigma = 0.01;
+  constexpr int kRuns = 400;
+  double square = 0;
+  for (std::uint64_t seed = 0; seed < kRuns; ++seed) {
+    ExecutionWorld sut(world, kSigma, seed);
+    (void)after(sut, {0, 0, 0, 0}, 1);
+    square += std::pow(sut.state().v[kJointX], 2);
+  }
+  EXPECT_NEAR(std::sqrt(square / kRuns) / kSigma, 1.0, 5 / std::sqrt(2.0 * kRuns));
+}
+
+TEST(ExecutionWorld, StaysNearTheQuietWorldWhenNoiseIsSmall) {
+  const WorldPtr world = compiled();
+  ExecutionWorld quiet(world, 0.0, 1), noisy(world, 1e-6, 1);
+  const State a = after(quiet, {0, 0, 0, 0}), b = after(noisy, {0, 0, 0, 0});
+  EXPECT_NE(a, b);
+  for (std::size_t i = 0; i < a.q.size(); ++i) EXPECT_NEAR(a.q[i], b.q[i], 1e-4);
+}
+
+TEST(ExecutionWorld, ReportsDivergenceAsAnError) {
+  ExecutionWorld sut(compiled(), 1e12, 1);
+  sut.begin(std::vector<double>{0, 0, 0, 0});
+  Result<void> ok;
+  for (int i = 0; i < 5 && ok; ++i) ok = sut.step();
+  ASSERT_FALSE(ok);
+  EXPECT_THAT(ok.error().message, testing::HasSubstr("diverged"));
+}
+
+}  // namespace
+}  // namespace jostle::physics_pool

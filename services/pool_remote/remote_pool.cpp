@@ -192,7 +192,7 @@ void RemotePool::end(Active& active, std::optional<Error> error) {
 void RemotePool::dispatch(std::stop_token stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    wake_.wait_for(lock, stop, kTick, [&] { return kicked_; });
+    wake_.wait_for(lock, stop, active_.empty() ? kHeartbeatPeriod : kTick, [&] { return kicked_; });
     kicked_ = false;
     const auto now = std::chrono::steady_clock::now();
     std::vector<WorkerId> strangers;

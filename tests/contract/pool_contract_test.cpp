@@ -1,0 +1,303 @@
+// What every Pool promises, asked of every implementation.
+
+#include <gmock/gmock.h>
+#include <fmt/format.h>
+
+#include <future>
+#include <latch>
+
+#include "physics_pool/local/thread_pool.hpp"
+#include "services/pool_remote/remote_pool.hpp"
+#include "tests/support/batches.hpp"
+#include "tests/support/worker_process.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace physics_pool;
+using ::testing::HasSubstr;
+
+constexpr auto kPatience = 60s;  // for what should take well under a second
+
+struct Implementation {
+  const char* name;
+  int threads;  // in this process, or
+  int workers;  // processes over DDS
+};
+
+// A pool and whatever it needs to be alive. One at a time: a process has one
+// participant.
+struct Rig {
+  explicit Rig(const Implementation& implementation) {
+    if (implementation.threads > 0) {
+      pool = std::make_unique<ThreadPool>(implementation.threads);
+      return;
+    }
+    for (int i = 0; i < implementation.workers; ++i) workers.emplace_back(test_domain());
+    participant = dds::Participant::open({.domain = test_domain()}).value();
+    auto remote = std::make_unique<services::RemotePool>(*participant);
+    if (!remote->wait_for_workers(implementation.workers, in(kPatience))) {
+      throw std::runtime_error("the workers were not found");
+    }
+    pool = std::move(remote);
+  }
+
+  std::vector<WorkerProcess> workers;
+  std::optional<dds::Participant> participant;
+  std::unique_ptr<Pool> pool;
+};
+
+// Starting workers takes longer than most tests, so consecutive tests of one
+// implementation share them.
+class PoolContract : public ::testing::TestWithParam<Implementation> {
+ protected:
+  static Pool& pool() {
+    if (!rig_ || owner_ != GetParam().name) {
+      rig_.reset();
+      rig_ = std::make_unique<Rig>(GetParam());
+      owner_ = GetParam().name;
+    }
+    return *rig_->pool;
+  }
+
+  PoolContract() { EXPECT_TRUE(sut.load(scene)); }
+
+  static int workers() { return GetParam().threads + GetParam().workers; }
+
+  BatchReply run(const RolloutBatch& batch) {
+    auto reply_result = sut.run(batch, in(kPatience));
+    if (!reply_result) throw std::runtime_error(reply_result.error().message);
+    return std::move(reply_result).value();
+  }
+
+  // The same batch on one thread: what every other implementation must match.
+  BatchReply reference(const RolloutBatch& batch) {
+    ThreadPool one(1);
+    EXPECT_TRUE(one.load(scene));
+    return one.run(batch, in(kPatience)).value();
+  }
+
+  const Scene scene = small_scene();
+  Pool& sut = pool();
+
+ private:
+  friend class EndOfRig;
+  static inline std::unique_ptr<Rig> rig_;
+  static inline std::string owner_;
+};
+
+// Takes the last rig down before static destruction takes the middleware.
+class EndOfRig : public ::testing::Environment {
+  void TearDown() override { PoolContract::rig_.reset(); }
+};
+const auto* const kEndOfRig = ::testing::AddGlobalTestEnvironment(new EndOfRig);
+
+// The hand around the target: noise decides which samples keep it there.
+RolloutBatch grasping_batch(const Scene& scene) {
+  RolloutBatch batch = push_batch(scene, 12);
+  const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
+  batch.x0.q[kJointX] = target.x - 0.070;  // 10 mm short of the pre-grasp region
+  batch.x0.q[kJointY] = target.y;
+  batch.nominal.truncate(1);
+  batch.nominal.step(0)[kControlX] = 0.03;
+  batch.objective.success_cost = 1e9;
+  batch.stop_on_success = true;
+  return batch;
+}
+
+TEST_P(PoolContract, EqualRequestsGiveBitEqualReplies) {
+  RolloutBatch batch = push_batch(scene, 6);
+  batch.stop_losers = false;
+  batch.want_all_trajectories = true;
+
+  const BatchReply first = run(batch), second = run(batch);
+
+  EXPECT_EQ(fingerprints(first), fingerprints(second));
+  EXPECT_EQ(fingerprints(first), fingerprints(reference(batch)));
+}
+
+TEST_P(PoolContract, WinnerIsTheSameWithAndWithoutStopping) {
+  RolloutBatch stopping = push_batch(scene, 8), thorough = stopping;
+  thorough.stop_losers = false;
+
+  const BatchReply stopped = run(stopping), whole = run(thorough), wanted = reference(thorough);
+
+  ASSERT_GE(wanted.winner, 0);
+  EXPECT_EQ(stopped.winner, wanted.winner);
+  EXPECT_EQ(winner_fingerprint(stopped), winner_fingerprint(wanted));
+  EXPECT_EQ(winner_fingerprint(whole), winner_fingerprint(wanted));
+}
+
+TEST_P(PoolContract, WinnerBeatsTheIncumbentOrThereIsNone) {
+  RolloutBatch batch = push_batch(scene, 4);
+  const BatchReply open = run(batch);
+  batch.incumbent = open.outcomes[static_cast<std::size_t>(open.winner)].cost;
+
+  EXPECT_EQ(run(batch).winner, -1);
+}
+
+TEST_P(PoolContract, LowestSuccessfulSampleWins) {
+  const RolloutBatch batch = grasping_batch(scene);
+  // One sample at a time: no sibling can interfere.
+  int lowest = -1;
+  for (std::uint32_t sample = 0; sample < batch.samples && lowest < 0; ++sample) {
+    RolloutBatch alone = batch;
+    alone.first_sample = sample;
+    alone.samples = 1;
+    if (reference(alone).outcomes[0].end == End::kSucceeded) lowest = static_cast<int>(sample);
+  }
+  ASSERT_GT(lowest, 0) << "the batch should make its first sample fail";
+
+  const BatchReply reply = run(batch);
+
+  EXPECT_EQ(reply.winner, lowest);
+  EXPECT_EQ(reply.outcomes[static_cast<std::size_t>(lowest)].end, End::kSucceeded);
+  EXPECT_EQ(winner_fingerprint(reply), winner_fingerprint(reference(batch)));
+}
+
+TEST_P(PoolContract, SamplesAreNamedFromTheFirstOneAsked) {
+  RolloutBatch whole = push_batch(scene, 5), part = whole;
+  whole.stop_losers = part.stop_losers = false;
+  part.first_sample = 3;
+  part.samples = 2;
+
+  const BatchReply all = run(whole), some = run(part);
+
+  ASSERT_EQ(some.outcomes.size(), 2u);
+  EXPECT_EQ(some.outcomes[0].sample, 3u);
+  EXPECT_EQ(some.outcomes[0].cost, all.outcomes[3].cost);
+  EXPECT_EQ(some.outcomes[1].cost, all.outcomes[4].cost);
+}
+
+TEST_P(PoolContract, UnknownWorldIsAnErrorThatNamesIt) {
+  RolloutBatch batch = push_batch(scene, 1);
+  batch.world = {.high = 0xabad1dea, .low = 7};
+
+  const auto reply_result = sut.run(batch, in(kPatience));
+
+  ASSERT_FALSE(reply_result);
+  EXPECT_EQ(reply_result.error().code, Code::kUnknownWorld);
+  EXPECT_THAT(reply_result.error().message, HasSubstr(to_string(batch.world)));
+}
+
+TEST_P(PoolContract, BadFieldIsNamed) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  const std::pair<const char*, std::function<void(RolloutBatch&)>> cases[] = {
+      {"x0.q", [](RolloutBatch& b) { b.x0.q.pop_back(); }},
+      {"x0.v", [](RolloutBatch& b) { b.x0.v.push_back(0); }},
+      {"x0.q[2]", [&](RolloutBatch& b) { b.x0.q[2] = kNaN; }},
+      {"x0.v[0]", [](RolloutBatch& b) { b.x0.v[0] = kInfinity; }},
+      {"nominal.values", [](RolloutBatch& b) { b.nominal.values.clear(); }},
+      {"nominal.values[5]", [&](RolloutBatch& b) { b.nominal.values[5] = kNaN; }},
+      {"nominal.values", [](RolloutBatch& b) { b.nominal.values.assign(4 * 10'001, 0.0); }},
+      {"u_before", [](RolloutBatch& b) { b.u_before.clear(); }},
+      {"law.sigma", [](RolloutBatch& b) { b.law.sigma.pop_back(); }},
+      {"law.sigma[1]", [](RolloutBatch& b) { b.law.sigma[1] = -1; }},
+      {"law.limit[0]", [](RolloutBatch& b) { b.law.limit[0] = 0; }},
+      {"samples", [](RolloutBatch& b) { b.samples = 0; }},
+      {"samples", [](RolloutBatch& b) { b.samples = 1'000'000'000; }},
+      {"step_duration", [](RolloutBatch& b) { b.step_duration = 1e9; }},
+      {"step_duration", [](RolloutBatch& b) { b.step_duration = 0.0301; }},
+      {"incumbent", [&](RolloutBatch& b) { b.incumbent = kNaN; }},
+      {"objective.edge", [](RolloutBatch& b) { b.objective.edge = -1; }},
+      {"wait", [](RolloutBatch& b) { b.wait = 1h; }},
+  };
+  for (const auto& [field, spoil] : cases) {
+    RolloutBatch batch = push_batch(scene, 2);
+    spoil(batch);
+    const auto reply_result = sut.run(batch, in(kPatience));
+    ASSERT_FALSE(reply_result) << field;
+    EXPECT_EQ(reply_result.error().code, Code::kInvalidArgument) << field;
+    EXPECT_THAT(reply_result.error().message, HasSubstr(fmt::format("{}: got", field)));
+  }
+  EXPECT_EQ(run(push_batch(scene, 2)).outcomes.size(), 2u);
+}
+
+TEST_P(PoolContract, ReturnsDeadlineErrorWhenTimeRunsOut) {
+  const auto start = Clock::now();
+
+  const auto reply_result = sut.run(wait_batch(scene, 4, 5s), start + 100ms);
+
+  ASSERT_FALSE(reply_result);
+  EXPECT_EQ(reply_result.error().code, Code::kDeadline);
+  EXPECT_LT(Clock::now() - start, 1s);
+}
+
+TEST_P(PoolContract, CancelledBatchFreesTheWorkers) {
+  std::stop_source stop;
+  std::latch running(2);
+  auto reply = std::async(std::launch::async, [&] {
+    running.arrive_and_wait();
+    return sut.run(wait_batch(scene, 8, 10s), in(kPatience), stop.get_token());
+  });
+  running.arrive_and_wait();
+  stop.request_stop();
+  ASSERT_EQ(reply.wait_for(2s), std::future_status::ready);
+
+  const auto reply_result = reply.get();
+  ASSERT_FALSE(reply_result);
+  EXPECT_EQ(reply_result.error().code, Code::kCancelled);
+  const auto start = Clock::now();
+  run(wait_batch(scene, 4, 1ms));
+  EXPECT_LT(Clock::now() - start, 1s);
+}
+
+TEST_P(PoolContract, StopRequestedBeforehandIsHonoured) {
+  std::stop_source stop;
+  stop.request_stop();
+
+  const auto reply_result = sut.run(wait_batch(scene, 2, 10s), in(kPatience), stop.get_token());
+
+  ASSERT_FALSE(reply_result);
+  EXPECT_EQ(reply_result.error().code, Code::kCancelled);
+}
+
+TEST_P(PoolContract, WorkIsSpreadOverAllWorkers) {
+  const PoolStatus before = sut.status();
+
+  run(wait_batch(scene, static_cast<std::uint32_t>(6 * workers()), 20ms));
+
+  const PoolStatus after = sut.status();
+  ASSERT_EQ(after.workers.size(), static_cast<std::size_t>(workers()));
+  for (std::size_t i = 0; i < after.workers.size(); ++i) {
+    EXPECT_TRUE(after.workers[i].alive);
+    EXPECT_GE(after.workers[i].rollouts - before.workers[i].rollouts, 3u) << after.workers[i].name;
+  }
+}
+
+TEST_P(PoolContract, ManySmallBatchesEndInTime) {
+  constexpr int kBatches = 200;
+  const auto start = Clock::now();
+  for (int i = 0; i < kBatches; ++i) run(wait_batch(scene, 4, 0ns));
+  const std::chrono::duration<double, std::milli> took = Clock::now() - start;
+  RecordProperty("milliseconds_per_batch", fmt::format("{:.3f}", took.count() / kBatches));
+  EXPECT_LT(took, 20s);
+}
+
+TEST_P(PoolContract, TwoThreadsMayRunAtOnce) {
+  const Scene other = small_scene(2);
+  ASSERT_TRUE(sut.load(other));
+  RolloutBatch here = push_batch(scene, 4), there = push_batch(other, 4);
+  here.stop_losers = there.stop_losers = false;
+
+  auto reply = std::async(std::launch::async, [&] { return sut.run(there, in(kPatience)); });
+  const BatchReply mine = run(here);
+  const auto theirs = reply.get();
+
+  ASSERT_TRUE(theirs) << theirs.error().message;
+  EXPECT_EQ(fingerprints(mine), fingerprints(run(here)));
+  EXPECT_EQ(fingerprints(*theirs), fingerprints(run(there)));
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, PoolContract,
+                         ::testing::Values(Implementation{"one_thread", 1, 0},
+                                           Implementation{"two_threads", 2, 0}),
+                         [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(OneWorker, PoolContract, ::testing::Values(Implementation{"one_worker", 0, 1}),
+                         [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(TwoWorkers, PoolContract, ::testing::Values(Implementation{"two_workers", 0, 2}),
+                         [](const auto& test) { return test.param.name; });
+
+}  // namespace
+}  // namespace jostle::tests

@@ -46,7 +46,8 @@ struct Progress {
 using OnProgress = std::function<void(const Progress&)>;
 
 /// Repeats  equal problems give bit-equal plans on any pool.
-/// Errors   those of Pool::run.
+/// Errors   those of Pool::run
+///          kInvalidArgument  every rollout from x0 diverged; says why
 class Planner {
  public:
   virtual ~Planner() = default;

@@ -1,5 +1,7 @@
 #include "planners/pbsto/pbsto.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -17,6 +19,7 @@ struct Pbsto::Run {
   TimePoint deadline;
   std::stop_token stop;
   Plan best;
+  std::string divergence;  // reason of the newest rollout that diverged
 
   RolloutBatch batch(const ControlSequence& nominal) const {
     const PbstoOptions& options = planner.options_;
@@ -40,7 +43,17 @@ struct Pbsto::Run {
     one.incumbent = best.cost;
     one.stop_losers = planner.options_.stop_losers;
     ++best.rollouts;
-    return planner.pool_.run(one, deadline, stop);
+    return run(one);
+  }
+
+  Result<BatchReply> run(const RolloutBatch& batch) {
+    auto reply_result = planner.pool_.run(batch, deadline, stop);
+    if (reply_result) {
+      for (const RolloutOutcome& outcome : reply_result->outcomes) {
+        if (outcome.end == End::kDiverged) divergence = outcome.reason;
+      }
+    }
+    return reply_result;
   }
 
   void adopt(ControlSequence controls, const RolloutOutcome& outcome) {
@@ -71,7 +84,7 @@ struct Pbsto::Run {
     noisy.incumbent = best.cost;
     const bool weighted = planner.options_.update == PbstoOptions::Update::kCostWeighted;
     noisy.stop_losers = planner.options_.stop_losers && !weighted;  // weights need every cost
-    auto reply_result = planner.pool_.run(noisy, deadline, stop);
+    auto reply_result = run(noisy);
     if (!reply_result) return reply_result.error();
     ++best.iterations;
     best.rollouts += noisy.samples;
@@ -144,6 +157,11 @@ Result<Plan> Pbsto::plan(const Problem& problem, TimePoint deadline, std::stop_t
   while (!run.done()) {
     if (auto ok = run.iterate(); !ok) return ok.error();
     run.report();
+  }
+  if (run.best.cost == physics_pool::kInfinity) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("x0: all {} rollouts from it diverged ({}), wanted a state that physics "
+                             "can start from", run.best.rollouts, run.divergence)};
   }
   return std::move(run.best);
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "physics_pool/sampling/counter_rng.hpp"
 
@@ -109,10 +110,11 @@ const char* to_string(Uncertainty level) { return kLevels[static_cast<std::size_
 
 double velocity_noise(Uncertainty level) { return 0.003 * scale_of(level); }
 
-Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed) {
-  if (level == Uncertainty::kNone) return execution;
-  const double scale = scale_of(level);
-  CounterStream random(seed, kPerturbStream);
+namespace {
+
+// A belief of everything in the scene; nothing if an object found no free place
+// because those before it are believed to be where it is.
+std::optional<Scene> draw_belief(const Scene& execution, double scale, CounterStream& random) {
   Scene belief = execution;
   belief.objects.clear();
   for (const SceneObject& truth : execution.objects) {
@@ -135,9 +137,22 @@ Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed) {
       object.yaw = random.normal(object.yaw, shrink * scale * kYawSigma);
       shrink *= 0.98;
     } while (shrink > 1e-3 && !is_free(belief, object, 0.0));
+    if (!is_free(belief, object, 0.0)) return std::nullopt;
     belief.objects.push_back(object);
   }
   return belief;
+}
+
+}  // namespace
+
+Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed) {
+  if (level == Uncertainty::kNone) return execution;
+  CounterStream random(seed, kPerturbStream);
+  // Begins again with less noise; without any, the truth itself fits.
+  for (double scale = scale_of(level); scale > 1e-6; scale *= 0.95) {
+    if (auto belief = draw_belief(execution, scale, random)) return *belief;
+  }
+  return execution;
 }
 
 State observed_state(const Scene& execution, const Scene& belief, const State& truth,

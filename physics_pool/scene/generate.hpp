@@ -41,7 +41,8 @@ double velocity_noise(Uncertainty level);
 /// masses and frictions (footnote 2 of Ch. 3: 5 mm, 0.005 rad, 5 mm, 10 g and
 /// 0.005 at low; twice and three times that at medium and high). What the
 /// thesis calls variances are standard deviations here. Believed objects never
-/// overlap: a draw that would is made again, with less noise after each try.
+/// overlap: a draw that would is made again, with less noise after each try, and
+/// if that does not help, everything is.
 /// What is measured during a run gets noise of its own, see observed_state.
 Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed);
 

@@ -79,8 +79,14 @@ double footprint_gap(const Footprint& a, const Footprint& b) {
   return rectangle_gap(a, b);
 }
 
-Error invalid(const std::string& origin, const std::string& field, const std::string& problem) {
-  return {Code::kInvalidArgument, fmt::format("{}: {}: {}", origin, field, problem)};
+// A field of a scene, as a file spells it and as people like to read it.
+struct Field {
+  std::string path;   // "objects[3].pose.x"
+  std::string shown;  // "objects[3] ('can').pose.x"
+};
+
+Error invalid(const Locate& locate, const Field& field, const std::string& problem) {
+  return {Code::kInvalidArgument, fmt::format("{}: {}: {}", locate(field.path), field.shown, problem)};
 }
 
 bool in_range(double value, double low, double high) { return value >= low && value <= high; }
@@ -92,11 +98,10 @@ struct Range {
   const char* unit;
 };
 
-Result<void> check(const std::string& origin, const std::string& where,
-                   std::initializer_list<Range> ranges) {
+Result<void> check(const Locate& locate, const Field& parent, std::initializer_list<Range> ranges) {
   for (const Range& r : ranges) {
     if (in_range(r.value, r.low, r.high)) continue;  // false for NaN
-    return invalid(origin, where + r.field,
+    return invalid(locate, {parent.path + r.field, parent.shown + r.field},
                    fmt::format("got {}, wanted {} to {} {}", r.value, r.low, r.high, r.unit));
   }
   return {};
@@ -127,16 +132,20 @@ bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap) {
 }
 
 Result<void> validate(const Scene& scene, const std::string& origin) {
+  return validate(scene, [&](std::string_view) { return origin; });
+}
+
+Result<void> validate(const Scene& scene, const Locate& locate) {
   if (scene.robot.model != "planar_gripper") {
-    return invalid(origin, "robot.model",
+    return invalid(locate, {"robot.model", "robot.model"},
                    fmt::format("got '{}', wanted one of: planar_gripper", scene.robot.model));
   }
   if (scene.task.kind != "grasp") {
-    return invalid(origin, "task.kind",
+    return invalid(locate, {"task.kind", "task.kind"},
                    fmt::format("got '{}', wanted one of: grasp", scene.task.kind));
   }
   const double half_x = scene.surface.size[0] / 2, half_y = scene.surface.size[1] / 2;
-  if (auto ok = check(origin, "",
+  if (auto ok = check(locate, {},
                       {{"surface.size[0]", scene.surface.size[0], 0.1, 10, "m"},
                        {"surface.size[1]", scene.surface.size[1], 0.1, 10, "m"},
                        {"surface.wall_height", scene.surface.wall_height, 0.01, 2, "m"},
@@ -153,40 +162,43 @@ Result<void> validate(const Scene& scene, const std::string& origin) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const SceneObject& object = scene.objects[i];
-    const std::string where = fmt::format("objects[{}] ('{}').", i, object.name);
-    if (object.name.empty()) return invalid(origin, where + "name", "got '', wanted a name");
+    const Field parent{fmt::format("objects[{}].", i), fmt::format("objects[{}] ('{}').", i, object.name)};
+    const auto invalid_at = [&](const char* field, const std::string& problem) {
+      return invalid(locate, {parent.path + field, parent.shown + field}, problem);
+    };
+    if (object.name.empty()) return invalid_at("name", "got '', wanted a name");
     if (!names.insert(object.name).second) {
-      return invalid(origin, where + "name", "already taken by another object, wanted a unique name");
+      return invalid_at("name", "already taken by another object, wanted a unique name");
     }
     auto sizes = object.shape == Shape::kBox
-                     ? check(origin, where, {{"size[0]", object.size[0], kSmallest, kLargest, "m"},
-                                             {"size[1]", object.size[1], kSmallest, kLargest, "m"},
-                                             {"size[2]", object.size[2], kSmallest, kLargest, "m"}})
-                     : check(origin, where, {{"radius", object.radius, kSmallest, kLargest, "m"},
-                                             {"height", object.height, kSmallest, kLargest, "m"}});
+                     ? check(locate, parent, {{"size[0]", object.size[0], kSmallest, kLargest, "m"},
+                                              {"size[1]", object.size[1], kSmallest, kLargest, "m"},
+                                              {"size[2]", object.size[2], kSmallest, kLargest, "m"}})
+                     : check(locate, parent, {{"radius", object.radius, kSmallest, kLargest, "m"},
+                                              {"height", object.height, kSmallest, kLargest, "m"}});
     if (!sizes) return sizes;
-    if (auto ok = check(origin, where, {{"mass", object.mass, 1e-4, 100, "kg"},
-                                        {"friction", object.friction, 0, 5, ""},
-                                        {"pose.x", object.x, -half_x, half_x, "m, on the surface"},
-                                        {"pose.y", object.y, -half_y, half_y, "m, on the surface"},
-                                        {"pose.yaw", object.yaw, -7, 7, "rad"}});
+    if (auto ok = check(locate, parent,
+                        {{"mass", object.mass, 1e-4, 100, "kg"},
+                         {"friction", object.friction, 0, 5, ""},
+                         {"pose.x", object.x, -half_x, half_x, "m, on the surface"},
+                         {"pose.y", object.y, -half_y, half_y, "m, on the surface"},
+                         {"pose.yaw", object.yaw, -7, 7, "rad"}});
         !ok) {
       return ok;
     }
     for (std::size_t j = 0; j < i; ++j) {
       if (!overlap(object, scene.objects[j])) continue;
-      return invalid(origin, where + "pose",
-                     fmt::format("inside object '{}' by {:.1f} mm, wanted a free place",
-                                 scene.objects[j].name,
-                                 -1e3 * footprint_gap(footprint(object), footprint(scene.objects[j]))));
+      return invalid_at("pose", fmt::format("inside object '{}' by {:.1f} mm, wanted a free place",
+                                            scene.objects[j].name,
+                                            -1e3 * footprint_gap(footprint(object),
+                                                                 footprint(scene.objects[j]))));
     }
     if (overlaps_robot(scene, object)) {
-      return invalid(origin, where + "pose",
-                     "inside the robot at its start, wanted a free place; move robot.start or the object");
+      return invalid_at("pose", "inside the robot at its start, wanted a free place; move robot.start or the object");
     }
   }
   if (scene.target() < 0) {
-    return invalid(origin, "task.target",
+    return invalid(locate, {"task.target", "task.target"},
                    fmt::format("got '{}', wanted the name of an object", scene.task.target));
   }
   return {};

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -90,6 +91,11 @@ Hash scene_hash(const Scene& scene);
 /// Sizes and masses in range, names unique, target and robot known, nothing
 /// inside anything else, everything on the surface.
 Result<void> validate(const Scene& scene, const std::string& origin);
+
+/// Where a field such as "objects[3].pose.x" came from, for messages: a file,
+/// or file and line.
+using Locate = std::function<std::string(std::string_view field)>;
+Result<void> validate(const Scene& scene, const Locate& locate);
 
 /// Whether the footprints of two objects come closer than `gap` metres.
 bool overlap(const SceneObject& a, const SceneObject& b, double gap = 0.0);

@@ -20,7 +20,8 @@ Scene read(const YAML::Node& root, const std::string& origin) {
   int version = 0;
   fields.required("jostle_scene", version);
   if (version != 1) {
-    throw Malformed{fmt::format("{}: jostle_scene: got version {}, wanted 1", origin, version)};
+    throw Malformed{fmt::format("{}:{}: jostle_scene: got version {}, wanted 1", origin,
+                                yaml::line_of(root, "jostle_scene"), version)};
   }
   fields.optional("name", scene.name);
   fields.section("surface", false, [&](Fields& surface) {
@@ -81,8 +82,12 @@ std::string quoted(const std::string& text) {
 
 Result<Scene> parse_scene(std::string_view yaml, const std::string& origin) {
   try {
-    Scene scene = read(YAML::Load(std::string(yaml)), origin);
-    if (auto ok = validate(scene, origin); !ok) return ok.error();
+    const YAML::Node root = YAML::Load(std::string(yaml));
+    Scene scene = read(root, origin);
+    const auto locate = [&](std::string_view field) {
+      return fmt::format("{}:{}", origin, yaml::line_of(root, field));
+    };
+    if (auto ok = validate(scene, locate); !ok) return ok.error();
     return scene;
   } catch (const Malformed& malformed) {
     return Error{Code::kInvalidArgument, malformed.message};

@@ -11,6 +11,7 @@
 #include <initializer_list>
 #include <set>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -21,12 +22,32 @@ struct Malformed {
   std::string message;
 };
 
+/// Line, from 1, of a field such as "objects[3].pose.x" in a file's tree; of the
+/// nearest part around it that the file spells out.
+inline int line_of(YAML::Node node, std::string_view field) {
+  int line = node.Mark().line + 1;
+  while (!field.empty()) {
+    const std::size_t end = field.find_first_of(".[");
+    const std::string key(field.substr(0, end));
+    field = end == field.npos ? "" : field.substr(end + 1);
+    const bool is_index = key.back() == ']';
+    const YAML::Node next = is_index ? node[std::stoul(key)] : node[key];
+    if (!next) break;
+    node.reset(next);
+    line = node.Mark().line + 1;
+  }
+  return line;
+}
+
 /// One mapping of a file: hands out its fields and knows which were asked for.
 class Fields {
  public:
   Fields(YAML::Node node, std::string path, const std::string& origin)
       : node_(std::move(node)), path_(std::move(path)), origin_(origin) {
-    if (!node_.IsMap()) fail(node_, path_, "wanted a mapping of keys to values");
+    if (!node_.IsMap()) {
+      fail(node_, path_.empty() ? "file" : path_,
+           fmt::format("got {}, wanted a mapping of keys to values", describe(node_)));
+    }
   }
 
   template <class T>
@@ -98,10 +119,12 @@ class Fields {
     }
   }
 
-  /// Refuses keys nobody asked for.
+  /// Refuses keys nobody asked for, and keys given twice.
   void finish() {
+    std::set<std::string> seen;
     for (const auto& entry : node_) {
       const auto key = entry.first.as<std::string>();
+      if (!seen.insert(key).second) fail(entry.first, name(key.c_str()), "given twice, wanted once");
       if (!known_.contains(key)) {
         fail(entry.first, name(key.c_str()),
              fmt::format("unknown key, wanted one of: {}", fmt::join(known_, ", ")));

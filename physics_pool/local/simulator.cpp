@@ -69,7 +69,13 @@ Simulator::Advance Simulator::advance(State& x, std::span<const double> u, int e
 }
 
 State separate(const World& world, const State& x, double depth, int rounds) {
-  const mjModel* model = world.model();
+  // Without weight nothing rubs on the surface, which would hold objects of a
+  // millimetre or two inside each other; and 5 ms close a gap six times faster
+  // than 2 ms (acceleration · h^2 per round).
+  const ModelPtr weightless(mj_copyModel(nullptr, world.model()));
+  weightless->opt.gravity[2] = 0.0;
+  weightless->opt.timestep = 0.005;
+  const mjModel* model = weightless.get();
   const DataPtr data(mj_makeData(model));
   State result = x;
   std::ranges::fill(result.v, 0.0);

@@ -59,7 +59,8 @@ class Run {
       if (auto ok = act(); !ok) return ok;
       if (ended()) break;
       const bool deviated = state_deviation(layout(), plan_.states.front(), x_) > options_.deviation_threshold;
-      if (!plan_.grasped || deviated || plan_.controls.steps() < options_.min_steps) {
+      const bool few_left = plan_.controls.steps() < std::max(options_.min_steps, 1);
+      if (!plan_.grasped || deviated || few_left) {
         ControlSequence controls = plan_.controls;
         controls.append(straight_step(plan_.states.back()));
         ++outcome_.replans;

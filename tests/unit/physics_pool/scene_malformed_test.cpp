@@ -123,7 +123,7 @@ const std::vector<Case> kCases{
     {"OffTheTable", "{x: 0.1, y: 0.1}", "{x: 0.31, y: 0.1}", {"bad.yaml:20", "objects[1]", "'b'", "pose.x", "got 0.31", "wanted", "on the surface"}},
     // A box edge at x = 0.02 and a disc of radius 0.04 at 0.05: 10 mm deep.
     {"InsideAnother", "{x: 0.1, y: 0.1}", "{x: 0.05, y: 0}", {"bad.yaml:20", "'b'", "inside object 'a'", "10.0 mm", "wanted a free place"}},
-    {"InsideTheRobot", "{x: 0.1, y: 0.1}", "{x: -0.29, y: 0}", {"bad.yaml:20", "'b'", "inside the robot", "wanted a free place"}},
+    {"InsideTheRobot", "{x: 0.1, y: 0.1}", "{x: -0.299, y: 0}", {"bad.yaml:20", "'b'", "inside the robot", "wanted a free place"}},
 };
 
 INSTANTIATE_TEST_SUITE_P(EveryKind, MalformedScene, testing::ValuesIn(kCases),

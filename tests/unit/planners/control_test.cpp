@@ -410,7 +410,7 @@ class Deviation : public ControllerTest {};
 
 TEST_F(Deviation, IsTheEuclideanDistanceOfJointsAndPoses) {
   State y = x;
-  EXPECT_EQ(state_deviation(geometry.layout, x, y), 0.0);
+  EXPECT_NEAR(state_deviation(geometry.layout, x, y), 0.0, 1e-7);  // acos(1 - eps)
   y.q[kJointX] += 0.3;
   y.q[5 + 7] += 0.4;
   EXPECT_NEAR(state_deviation(geometry.layout, x, y), 0.5, 1e-12);
@@ -427,7 +427,7 @@ TEST_F(Deviation, IsTheEuclideanDistanceOfJointsAndPoses) {
 TEST_F(Deviation, IgnoresVelocities) {
   State y = x;
   y.v.assign(y.v.size(), 3.0);
-  EXPECT_EQ(state_deviation(geometry.layout, x, y), 0.0);
+  EXPECT_EQ(state_deviation(geometry.layout, x, y), state_deviation(geometry.layout, x, x));
 }
 
 class AssembleState : public ControllerTest {};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "physics_pool/scene/planar_gripper.hpp"
 
@@ -15,7 +16,10 @@ namespace hand = physics_pool::planar_gripper;
 
 struct Step {
   double dx = 0.0, dy = 0.0;  // m, world frame
+  double turn = 0.0;          // rad, to face the target
 };
+
+constexpr double kFacingSpeed = 0.3;  // rad/s, at most, in a straight step
 
 // From G to the point at pre-grasp distance in front of the target.
 Step to_pregrasp(const physics_pool::TaskGeometry& geometry, const State& x) {
@@ -23,7 +27,8 @@ Step to_pregrasp(const physics_pool::TaskGeometry& geometry, const State& x) {
   const double dx = x.q[q] - x.q[kJointX], dy = x.q[q + 1] - x.q[kJointY];
   const double distance = std::hypot(dx, dy);
   const double share = distance > 0 ? (distance - hand::kGraspDepth) / distance : 0.0;
-  return {share * dx, share * dy};
+  const double turn = std::remainder(std::atan2(dy, dx) - x.q[kJointRotation], 2 * std::numbers::pi);
+  return {.dx = share * dx, .dy = share * dy, .turn = turn};
 }
 
 // One controller run: Alg. 2 and 3 share everything but when they plan.
@@ -169,7 +174,8 @@ class Run {
     return straight_line(setup_.geometry, x_, options_.initial_steps, options_.step_duration);
   }
 
-  // "Single straight step to target", Alg. 2 line 11, turning to face it.
+  // "Single straight step to target" (Alg. 2, line 11): towards it, turning to
+  // face it, hand opening.
   std::vector<double> straight_step(const State& x) const {
     const Step way = to_pregrasp(setup_.geometry, x);
     const double distance = std::hypot(way.dx, way.dy);
@@ -179,6 +185,8 @@ class Run {
       u[kControlX] = speed * way.dx / distance;
       u[kControlY] = speed * way.dy / distance;
     }
+    u[kControlRotation] = std::clamp(way.turn / options_.step_duration, -kFacingSpeed, kFacingSpeed);
+    u[kControlOpening] = (hand::kStroke - x.q[kJointLeft] - x.q[kJointRight]) / options_.step_duration;
     return u;
   }
 

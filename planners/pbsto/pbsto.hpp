@@ -16,7 +16,7 @@ struct PbstoOptions {
   int rollouts = 8;  ///< K per iteration; more find more and cost more
   /// Standard deviations of the noise on x, y [m/s], rotation [rad/s] and
   /// opening [m/s].
-  std::vector<double> sigma{0.04, 0.04, 0.25, 0.01};
+  std::vector<double> sigma{0.04, 0.04, 0.25, 0.004};
   std::vector<double> limit{0.15, 0.15, 0.8, 0.05};  ///< largest controls, same units
   Update update = Update::kGreedy;
   double lambda = 100.0;       ///< of Eq. 5.8, in units of cost; small is greedy

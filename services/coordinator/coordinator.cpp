@@ -1,0 +1,240 @@
+#include "services/coordinator/coordinator.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "physics_pool/local/simulator.hpp"
+#include "services/world_link/messages.hpp"
+#include "services/world_link/world_client.hpp"
+
+namespace jostle::services {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kFeedbackPeriod{100};
+constexpr std::size_t kGoalQueue = 8;
+
+const char* word(planners::Phase phase) {
+  switch (phase) {
+    case planners::Phase::kPlanning: return "planning";
+    case planners::Phase::kActing: return "acting";
+    case planners::Phase::kClosing: return "closing";
+    case planners::Phase::kDone: return "done";
+  }
+  return "";
+}
+
+Result<planners::ControlOptions::Method> parse_controller(const std::string& name) {
+  if (name == "or") return planners::ControlOptions::Method::kOnline;
+  if (name == "nr") return planners::ControlOptions::Method::kNaive;
+  return Error{Code::kInvalidArgument, fmt::format("controller: got '{}', wanted or, nr", name)};
+}
+
+// What the asker puts into result.json and draws.
+std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::uint64_t seed) {
+  const planners::Plan& plan = outcome.first_plan;
+  nlohmann::json report{{"success", outcome.success},
+                        {"reason", outcome.reason},
+                        {"scene_hash", to_string(scene)},
+                        {"seed", seed},
+                        {"plan_hash", to_string(hash_of(plan.controls.values))},
+                        {"cost", plan.cost},
+                        {"iterations", plan.iterations},
+                        {"replans", outcome.replans},
+                        {"actions", outcome.actions},
+                        {"plan_seconds", outcome.plan_time.count()},
+                        {"total_seconds", outcome.total_time.count()},
+                        {"rollouts", outcome.rollouts},
+                        {"dropped_objects", outcome.dropped},
+                        {"plan_states", nlohmann::json::array()},
+                        {"observed_states", nlohmann::json::array()}};
+  for (const State& x : plan.states) report["plan_states"].push_back(x.q);
+  for (const State& x : outcome.observed) report["observed_states"].push_back(x.q);
+  return report.dump();
+}
+
+}  // namespace
+
+Coordinator::Coordinator(const dds::Participant& participant, physics_pool::Pool& pool)
+    : participant_(participant),
+      pool_(pool),
+      feedback_writer_(participant, topics::kTaskFeedback),
+      result_writer_(participant, topics::kTaskResult),
+      goals_(participant, topics::kTaskGoal, kGoalQueue),
+      cancels_(participant, topics::kTaskCancel, [this](const jostle_msgs::msg::Cancel& cancel) {
+        const std::lock_guard lock(mutex_);
+        if (!goal_id_.empty() && cancel.goal_id() == goal_id_) cancel_.request_stop();
+      }) {
+  feedback_.phase("idle");
+}
+
+void Coordinator::run(std::stop_token stop) {
+  const std::jthread ticker([this](std::stop_token own) { publish_feedback(own); });
+  while (!stop.stop_requested()) {
+    auto goal = goals_.take(steady_clock::now() + std::chrono::seconds(1), stop);
+    if (goal && !stop.stop_requested()) serve(*goal, stop);
+  }
+}
+
+void Coordinator::serve(const Goal& goal, std::stop_token stop) {
+  std::stop_token cancelled;
+  {
+    const std::lock_guard lock(mutex_);
+    goal_id_ = goal.goal_id();
+    cancel_ = {};
+    cancelled = cancel_.get_token();
+    started_ = steady_clock::now();
+    rollouts_before_ = 0;
+    feedback_ = {};
+    feedback_.goal_id(goal_id_);
+    feedback_.phase("preparing");
+  }
+  spdlog::info("goal {}: controller {}, seed {}", goal.goal_id(), goal.controller(), goal.seed());
+  // A stop of the process cancels the task.
+  const std::stop_callback forward(stop, [this] {
+    const std::lock_guard lock(mutex_);
+    cancel_.request_stop();
+  });
+  jostle_msgs::msg::GoalResult result;
+  result.goal_id(goal.goal_id());
+  {
+    const std::jthread refuser([this](std::stop_token own) { refuse_goals_meanwhile(own); });
+    auto task_result = prepare(goal);
+    auto outcome_result = task_result ? perform(goal, *task_result, cancelled)
+                                      : Result<planners::Outcome>(task_result.error());
+    if (outcome_result) {
+      result.success(outcome_result->success);
+      result.reason(outcome_result->reason);
+      result.report(report_of(*outcome_result, physics_pool::scene_hash(task_result->execution), goal.seed()));
+    } else {
+      const Error& error = outcome_result.error();
+      result.reason(error.code == Code::kCancelled ? "cancelled" : "the system failed");
+      result.error(error.message);
+    }
+  }
+  spdlog::info("goal {}: {} {}", goal.goal_id(), result.reason(), result.error());
+  result_writer_.write(result);
+  const std::lock_guard lock(mutex_);
+  goal_id_.clear();
+  feedback_.goal_id("");
+  feedback_.phase("idle");
+}
+
+Result<Coordinator::Task> Coordinator::prepare(const Goal& goal) {
+  auto execution_result = physics_pool::parse_scene(goal.execution_scene(), "goal.execution_scene");
+  if (!execution_result) return execution_result.error();
+  auto planning_result = physics_pool::parse_scene(goal.planning_scene(), "goal.planning_scene");
+  if (!planning_result) return planning_result.error();
+  auto parameters_result = parse_parameters(goal.parameters(), "goal.parameters");
+  if (!parameters_result) return parameters_result.error();
+  auto method_result = parse_controller(goal.controller());
+  if (!method_result) return method_result.error();
+  auto world_result = pool_.load(*planning_result);
+  if (!world_result) return world_result.error();
+  Task task{.execution = std::move(execution_result).value(),
+            .planning = std::move(planning_result).value(),
+            .parameters = std::move(parameters_result).value(),
+            .world = *world_result};
+  task.parameters.control.method = *method_result;
+  task.parameters.control.plan_only = goal.plan_only();
+  return task;
+}
+
+Result<planners::Outcome> Coordinator::perform(const Goal& goal, const Task& task, std::stop_token stop) {
+  auto believed_result = physics_pool::World::compile(task.planning);
+  if (!believed_result) return believed_result.error();
+  const physics_pool::WorldPtr believed = *believed_result;
+  const physics_pool::TaskGeometry& geometry = believed->geometry();
+
+  RobotClient robot(participant_);
+  ObjectsClient objects(participant_, robot);
+  planners::Pbsto planner(pool_, task.parameters.planner,
+                          [&](const planners::Progress& progress) { note(progress, geometry); });
+  planners::ControlSetup setup{.planner = planner,
+                               .robot = robot,
+                               .objects = objects,
+                               .geometry = geometry,
+                               .objective = task.parameters.planner.objective,
+                               .world = task.world,
+                               .seed = goal.seed()};
+  // Believed shapes at exact poses need no moving apart, and must not get it:
+  // the plan for a perfectly known world starts from that very world.
+  if (task.world != physics_pool::scene_hash(task.execution)) {
+    setup.make_feasible = [&believed](const State& x) { return physics_pool::separate(*believed, x); };
+  }
+  return planners::run_controller(
+      setup, task.parameters.control,
+      [&](const planners::ControlEvent& event) { note(event, geometry); }, std::move(stop));
+}
+
+void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
+  while (!stop.stop_requested()) {
+    auto goal = goals_.take(steady_clock::now() + std::chrono::seconds(1), stop);
+    if (!goal) continue;
+    jostle_msgs::msg::GoalResult refusal;
+    refusal.goal_id(goal->goal_id());
+    refusal.reason("refused");
+    {
+      const std::lock_guard lock(mutex_);
+      refusal.error(fmt::format("coordinator: busy with goal {}; cancel it or wait", goal_id_));
+    }
+    result_writer_.write(refusal);
+  }
+}
+
+void Coordinator::note(const planners::ControlEvent& event, const physics_pool::TaskGeometry& geometry) {
+  const std::lock_guard lock(mutex_);
+  feedback_.phase(word(event.phase));
+  feedback_.actions(event.actions);
+  feedback_.replans(event.replans);
+  if (event.phase == planners::Phase::kPlanning) rollouts_before_ = feedback_.rollouts();
+  if (event.observed && !event.observed->q.empty()) {
+    feedback_.target_distance(physics_pool::target_bearing(geometry, *event.observed).distance);
+  }
+}
+
+void Coordinator::note(const planners::Progress& progress, const physics_pool::TaskGeometry& geometry) {
+  const std::lock_guard lock(mutex_);
+  feedback_.iteration(progress.iteration);
+  feedback_.cost(progress.cost);
+  feedback_.rollouts(rollouts_before_ + progress.rollouts);
+  if (progress.final_state) {
+    feedback_.target_distance(physics_pool::target_bearing(geometry, *progress.final_state).distance);
+  }
+}
+
+void Coordinator::publish_feedback(std::stop_token stop) {
+  std::mutex sleeping;
+  std::condition_variable_any asleep;
+  while (!stop.stop_requested()) {
+    const physics_pool::PoolStatus pool = pool_.status();
+    jostle_msgs::msg::Feedback feedback;
+    {
+      const std::lock_guard lock(mutex_);
+      feedback = feedback_;
+      if (!goal_id_.empty()) {
+        feedback.elapsed(std::chrono::duration<double>(steady_clock::now() - started_).count());
+      }
+    }
+    const std::chrono::duration<double> now = std::chrono::system_clock::now().time_since_epoch();
+    feedback.header(make_header(now.count(), ""));
+    for (const physics_pool::WorkerStatus& worker : pool.workers) {
+      jostle_msgs::msg::WorkerReport report;
+      report.name(worker.name);
+      report.alive(worker.alive);
+      report.capacity(worker.capacity);
+      report.rollouts(worker.rollouts);
+      report.engine_steps(worker.engine_steps);
+      feedback.workers().push_back(std::move(report));
+    }
+    feedback_writer_.write(feedback);
+    std::unique_lock lock(sleeping);
+    asleep.wait_for(lock, stop, kFeedbackPeriod, [] { return false; });
+  }
+}
+
+}  // namespace jostle::services

@@ -1,0 +1,68 @@
+#pragma once
+/// \file
+/// The coordinator: accepts a task, plans it with a pool, executes it, reports.
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string>
+
+#include "physics_pool/api/pool.hpp"
+#include "planners/control/controller.hpp"
+#include "services/config/parameters.hpp"
+#include "services/dds/participant.hpp"
+#include "services/dds/reader.hpp"
+#include "services/dds/topics.hpp"
+#include "services/dds/writer.hpp"
+
+namespace jostle::services {
+
+/// One task at a time. A goal that arrives meanwhile is refused at once; a
+/// cancelled one ends within a fraction of a second, the robot standing still.
+///
+/// Feedback goes out several times a second whether there is news or not, so
+/// that silence means death.
+class Coordinator {
+ public:
+  Coordinator(const dds::Participant& participant, physics_pool::Pool& pool);
+
+  /// Until a stop is requested.
+  void run(std::stop_token stop);
+
+ private:
+  using Goal = jostle_msgs::msg::Goal;
+
+  /// Everything a goal's texts say, checked.
+  struct Task {
+    physics_pool::Scene execution, planning;
+    Parameters parameters;
+    Hash world;
+  };
+
+  Result<Task> prepare(const Goal& goal);
+  Result<planners::Outcome> perform(const Goal& goal, const Task& task, std::stop_token stop);
+  void serve(const Goal& goal, std::stop_token stop);
+  void refuse_goals_meanwhile(std::stop_token stop);
+  void publish_feedback(std::stop_token stop);
+  void note(const planners::ControlEvent& event, const physics_pool::TaskGeometry& geometry);
+  void note(const planners::Progress& progress, const physics_pool::TaskGeometry& geometry);
+
+  const dds::Participant participant_;
+  physics_pool::Pool& pool_;
+
+  std::mutex mutex_;  // guards feedback_, started_, goal_id_ and cancel_
+  jostle_msgs::msg::Feedback feedback_;
+  std::chrono::steady_clock::time_point started_;
+  std::uint64_t rollouts_before_ = 0;  // of the plans before the present one
+  std::string goal_id_;                // empty: no task
+  std::stop_source cancel_;            // of the present task
+
+  dds::Writer<jostle_msgs::msg::Feedback> feedback_writer_;
+  dds::Writer<jostle_msgs::msg::GoalResult> result_writer_;
+  dds::Inbox<Goal> goals_;
+  dds::Reader<jostle_msgs::msg::Cancel> cancels_;
+};
+
+}  // namespace jostle::services

@@ -1,0 +1,45 @@
+// jostle coordinator: plans and executes the tasks it is given.
+
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <thread>
+
+#include "physics_pool/local/thread_pool.hpp"
+#include "services/coordinator/coordinator.hpp"
+#include "services/pool_remote/remote_pool.hpp"
+#include "services/support/program.hpp"
+
+int main(int argc, char** argv) {
+  using namespace jostle;
+  using namespace jostle::services;
+  CLI::App app("Accepts a task, plans it with a pool of workers, executes it and reports.",
+               "jostle coordinator");
+  std::string pool_kind = "dds";
+  int threads = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
+  dds::ParticipantOptions participant_options{.name = "jostle_coordinator"};
+  bool with_parent = false;
+  app.add_option("--pool", pool_kind, "dds: worker processes; threads: in this process")
+      ->capture_default_str()->check(CLI::IsMember({"dds", "threads"}));
+  app.add_option("--threads", threads, "Of the pool of threads")->capture_default_str()->check(CLI::Range(1, 1024));
+  app.add_option("--domain", participant_options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
+  app.add_flag("--die-with-parent", with_parent, "End when the starting process ends");
+  CLI11_PARSE(app, argc, argv);
+  if (with_parent) die_with_parent();
+  const StopSignal signal;
+  set_up_logging("coordinator");
+
+  auto participant_result = dds::Participant::open(participant_options);
+  if (!participant_result) {
+    spdlog::error("{}", participant_result.error().message);
+    return kExitUsage;
+  }
+  std::unique_ptr<physics_pool::Pool> pool;
+  if (pool_kind == "dds") {
+    pool = std::make_unique<RemotePool>(*participant_result);
+  } else {
+    pool = std::make_unique<physics_pool::ThreadPool>(threads);
+  }
+  Coordinator(*participant_result, *pool).run(signal.token());
+  return kExitOk;
+}

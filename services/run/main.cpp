@@ -1,0 +1,102 @@
+// jostle run: one scene, from start to grasp, on this machine.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <thread>
+
+#include "services/config/parameters.hpp"
+#include "services/run/display.hpp"
+#include "services/run/report.hpp"
+#include "services/run/session.hpp"
+#include "services/support/files.hpp"
+#include "services/support/program.hpp"
+
+namespace {
+
+using namespace jostle;
+using namespace jostle::services;
+
+struct Arguments {
+  std::string scene, level = "none", parameters;
+};
+
+// Reads the files the arguments name.
+Result<void> complete(const Arguments& arguments, RunOptions& options) {
+  auto level_result = physics_pool::parse_uncertainty(arguments.level);
+  if (!level_result) return level_result.error();
+  options.level = *level_result;
+  auto scene_result = physics_pool::load_scene(arguments.scene);
+  if (!scene_result) return scene_result.error();
+  options.scene = std::move(scene_result).value();
+  options.planning = physics_pool::perturb(options.scene, options.level, options.seed);
+  const std::filesystem::path file =
+      arguments.parameters.empty() ? data_file("experiments/chapter3.yaml")
+                                   : std::filesystem::path(arguments.parameters);
+  auto parameters_result = read_text(file);
+  if (!parameters_result) return parameters_result.error();
+  options.parameters = std::move(parameters_result).value();
+  if (auto ok = parse_parameters(options.parameters, file.string()); !ok) return ok.error();
+  return {};
+}
+
+int fail(const Error& error, int code) {
+  fmt::print(stderr, "jostle run: {}\n", error.message);
+  return code;
+}
+
+int perform(const RunOptions& options, std::stop_token stop) {
+  Display display(!options.headless && isatty(STDERR_FILENO));
+  auto session_result = Session::start(
+      options, {.on_feedback = [&](const auto& feedback) { display.show(feedback); },
+                .on_notice = [&](const std::string& text) { display.notice(text); }});
+  if (!session_result) return fail(session_result.error(), kExitBroken);
+  auto result = (*session_result)->perform(stop);
+  display.finish();
+  if (!result) return fail(result.error(), result.error().code == Code::kCancelled ? kExitInterrupted : kExitBroken);
+  if (!result->error().empty()) return fail({Code::kUnavailable, result->error()}, kExitBroken);
+  session_result->reset();  // before drawing: every process it started is gone
+  if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), kExitBroken);
+  return result->success() ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Plans and executes a scene: starts workers, a simulated world and a coordinator, shows\n"
+               "their progress, and ends them. More workers may join from anywhere: jostle worker.",
+               "jostle run");
+  Arguments arguments;
+  RunOptions options;
+  options.workers = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
+  app.add_option("scene", arguments.scene, "Scene file; `jostle scene generate` makes one")->required();
+  app.add_option("--workers", options.workers, "Worker processes, or threads (default: one per core)")
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--controller", options.controller, "or: online re-planning; nr: naive re-planning")
+      ->capture_default_str()->check(CLI::IsMember({"or", "nr"}));
+  app.add_option("--uncertainty", arguments.level, "none, low, medium or high")->capture_default_str();
+  app.add_option("--seed", options.seed, "Of all noise, the planner's and the world's")->capture_default_str();
+  app.add_option("--pool", options.pool, "dds: worker processes; threads: threads of the coordinator")
+      ->capture_default_str()->check(CLI::IsMember({"dds", "threads"}));
+  app.add_option("--parameters", arguments.parameters, "Planner's and controller's (default: experiments/chapter3.yaml)");
+  app.add_option("--json", options.json, "File for the result");
+  app.add_option("--picture", options.picture, "PNG of the execution");
+  app.add_option("--rate", options.rate, "World seconds per second while acting; 0: as fast as possible")
+      ->capture_default_str()->check(CLI::Range(0.0, 1000.0));
+  app.add_flag("--plan-only", options.plan_only, "Stop after the first plan");
+  app.add_flag("--headless", options.headless, "Plain lines instead of a live display");
+  app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
+  app.footer("Exit codes: 0 grasped, 1 not grasped, 2 bad input, 3 a part of the system failed, 130 interrupted.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitOk : kExitUsage;
+  }
+  if (options.pool == "threads" && options.workers == 0) {
+    return fail({Code::kInvalidArgument, "--workers: got 0, wanted at least 1 thread"}, kExitUsage);
+  }
+  const StopSignal signal;
+  if (auto ok = complete(arguments, options); !ok) return fail(ok.error(), kExitUsage);
+  return perform(options, signal.token());
+}

@@ -1,0 +1,31 @@
+#pragma once
+/// \file
+/// What `jostle run` was asked for.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "physics_pool/scene/generate.hpp"
+#include "physics_pool/scene/scene.hpp"
+
+namespace jostle::services {
+
+struct RunOptions {
+  physics_pool::Scene scene;     ///< execution world
+  physics_pool::Scene planning;  ///< what the planner believes
+  std::string parameters;        ///< YAML text
+  physics_pool::Uncertainty level = physics_pool::Uncertainty::kNone;
+  std::string controller = "or";
+  std::string pool = "dds";
+  int workers = 2;
+  std::uint64_t seed = 1;
+  double rate = 0.0;     ///< of the simulated world; 0: as fast as possible
+  bool plan_only = false;
+  bool headless = false; ///< plain lines instead of a live display
+  std::optional<int> domain;
+  std::filesystem::path json, picture;  ///< empty: none
+};
+
+}  // namespace jostle::services

@@ -1,0 +1,214 @@
+#include "services/run/session.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "services/support/files.hpp"
+
+namespace jostle::services {
+namespace {
+
+constexpr std::chrono::milliseconds kSilence{1500};  // of a process that speaks ten times a second
+constexpr std::chrono::seconds kStart{15};           // for processes to start and find each other
+constexpr std::chrono::milliseconds kTick{50};
+constexpr std::chrono::seconds kCancelPatience{2};
+constexpr int kMostRestarts = 5;                     // within kRestartWindow: something is wrong
+constexpr std::chrono::seconds kRestartWindow{10};
+
+Result<std::filesystem::path> make_folder() {
+  std::string name = (std::filesystem::temp_directory_path() / "jostle-run-XXXXXX").string();
+  if (mkdtemp(name.data())) return std::filesystem::path(name);
+  return Error{Code::kIo, fmt::format("{}: cannot be made", name)};
+}
+
+std::filesystem::path program(const char* name) {
+  return program_folder() / (std::string("jostle_") + name);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Session>> Session::start(const RunOptions& options, Watcher watcher) {
+  auto participant_result = dds::Participant::open({.name = "jostle_run", .domain = options.domain});
+  if (!participant_result) return participant_result.error();
+  auto folder_result = make_folder();
+  if (!folder_result) return folder_result.error();
+  std::unique_ptr<Session> session(
+      new Session(options, std::move(watcher), *participant_result, *folder_result));
+  if (auto ok = session->start_processes(); !ok) return ok.error();
+  return session;
+}
+
+Session::Session(const RunOptions& options, Watcher watcher, dds::Participant participant,
+                 std::filesystem::path folder)
+    : options_(options),
+      watcher_(std::move(watcher)),
+      participant_(std::move(participant)),
+      folder_(std::move(folder)),
+      goal_id_(folder_.filename().string()),
+      goal_(participant_, topics::kTaskGoal),
+      cancel_(participant_, topics::kTaskCancel),
+      feedback_(participant_, topics::kTaskFeedback, 64),
+      world_(participant_, topics::kRobotStatus, 64),
+      results_(participant_, topics::kTaskResult, 8) {}
+
+Session::~Session() {
+  // All at once, then one after the other: shutting down takes as long as the slowest.
+  for (ChildProcess& worker : workers_) worker.terminate();
+  if (world_process_) world_process_->terminate();
+  if (coordinator_process_) coordinator_process_->terminate();
+  workers_.clear();
+  world_process_.reset();
+  coordinator_process_.reset();
+  std::error_code ignored;
+  std::filesystem::remove_all(folder_, ignored);
+}
+
+Result<void> Session::start_processes() {
+  const std::string domain = std::to_string(participant_.domain());
+  const auto scene_file = folder_ / "scene.yaml";
+  if (auto ok = write_text(scene_file, physics_pool::to_yaml(options_.scene)); !ok) return ok;
+
+  auto world_result = ChildProcess::start(
+      program("sim"),
+      {scene_file.string(), "--uncertainty", physics_pool::to_string(options_.level), "--seed",
+       std::to_string(options_.seed), "--rate", fmt::format("{}", options_.rate), "--domain", domain,
+       "--die-with-parent"},
+      folder_ / "sim.log");
+  if (!world_result) return world_result.error();
+  world_process_ = std::move(world_result).value();
+
+  auto coordinator_result = ChildProcess::start(
+      program("coordinator"),
+      {"--pool", options_.pool, "--threads", std::to_string(options_.workers), "--domain", domain,
+       "--die-with-parent"},
+      folder_ / "coordinator.log");
+  if (!coordinator_result) return coordinator_result.error();
+  coordinator_process_ = std::move(coordinator_result).value();
+
+  for (int i = 0; options_.pool == "dds" && i < options_.workers; ++i) {
+    auto worker_result = start_worker();
+    if (!worker_result) return worker_result.error();
+    workers_.push_back(std::move(worker_result).value());
+  }
+  goal_deadline_ = Clock::now() + kStart;
+  return {};
+}
+
+Result<ChildProcess> Session::start_worker() {
+  const std::string name = fmt::format("worker-{}", workers_started_++);
+  return ChildProcess::start(
+      program("worker"),
+      {"--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent"},
+      folder_ / (name + ".log"));
+}
+
+Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
+  std::optional<Clock::time_point> cancelled;
+  for (;;) {
+    if (auto result = results_.take(Clock::now() + kTick, cancelled ? std::stop_token{} : stop)) {
+      if (result->goal_id() == goal_id_) {
+        if (cancelled) return Error{Code::kCancelled, "interrupted; the task was cancelled"};
+        return *std::move(result);
+      }
+    }
+    if (stop.stop_requested() && !cancelled) {
+      cancelled = Clock::now();
+      jostle_msgs::msg::Cancel cancel;
+      cancel.goal_id(goal_id_);
+      cancel_.write(cancel);
+    }
+    if (cancelled && (!sent_ || Clock::now() - *cancelled > kCancelPatience)) {
+      return Error{Code::kCancelled, "interrupted"};
+    }
+    listen();
+    if (auto ok = look_after(); !ok) return ok.error();
+    if (!sent_ && !cancelled) {
+      if (auto ok = send_goal(); !ok) return ok.error();
+    }
+  }
+}
+
+void Session::listen() {
+  for (const auto& feedback : feedback_.take_all()) {
+    coordinator_heard_ = Clock::now();
+    if (sent_ && feedback.goal_id() == goal_id_ && watcher_.on_feedback) watcher_.on_feedback(feedback);
+  }
+  if (!world_.take_all().empty()) world_heard_ = Clock::now();
+}
+
+// The goal goes out once everybody who has a part in it was heard.
+Result<void> Session::send_goal() {
+  if (!coordinator_heard_ || !world_heard_ || goal_.matched() == 0 || results_.matched() == 0) {
+    if (Clock::now() < goal_deadline_) return {};
+    return Error{Code::kUnavailable,
+                 fmt::format("{} not heard within {} s of its start on domain {}; `jostle doctor` checks "
+                             "shared memory and multicast",
+                             coordinator_heard_ ? "the simulated world was" : "the coordinator was",
+                             kStart.count(), participant_.domain())};
+  }
+  if (goal_.matched() > 1) {
+    return Error{Code::kUnavailable,
+                 fmt::format("domain {}: {} coordinators, wanted one; another run uses this domain, set "
+                             "ROS_DOMAIN_ID to a free one", participant_.domain(), goal_.matched())};
+  }
+  jostle_msgs::msg::Goal goal;
+  goal.goal_id(goal_id_);
+  goal.execution_scene(physics_pool::to_yaml(options_.scene));
+  goal.planning_scene(physics_pool::to_yaml(options_.planning));
+  goal.parameters(options_.parameters);
+  goal.controller(options_.controller);
+  goal.seed(options_.seed);
+  goal.plan_only(options_.plan_only);
+  goal_.write(goal);
+  sent_ = true;
+  return {};
+}
+
+Result<void> Session::look_after() {
+  if (auto ok = check_alive("the simulated world", *world_process_); !ok) return ok;
+  if (auto ok = check_alive("the coordinator", *coordinator_process_); !ok) return ok;
+  if (world_heard_) {
+    if (auto ok = check_heard("the simulated world", *world_heard_); !ok) return ok;
+  }
+  if (coordinator_heard_) {
+    if (auto ok = check_heard("the coordinator", *coordinator_heard_); !ok) return ok;
+  }
+  for (ChildProcess& worker : workers_) {
+    const auto ended = worker.ended();
+    if (!ended) continue;
+    const auto now = Clock::now();
+    std::erase_if(restarts_, [&](Clock::time_point then) { return now - then > kRestartWindow; });
+    restarts_.push_back(now);
+    if (restarts_.size() > kMostRestarts) {
+      return Error{Code::kUnavailable,
+                   fmt::format("workers keep ending: {} within {} s, the last one: {}\n{}", restarts_.size(),
+                               kRestartWindow.count(), *ended, worker.last_words())};
+    }
+    auto worker_result = start_worker();
+    if (!worker_result) return worker_result.error();
+    if (watcher_.on_notice) {
+      watcher_.on_notice(fmt::format("worker {} ended ({}); started another", worker.pid(), *ended));
+    }
+    worker = std::move(worker_result).value();
+  }
+  return {};
+}
+
+Result<void> Session::check_alive(const std::string& name, ChildProcess& child) const {
+  const auto ended = child.ended();
+  if (!ended) return {};
+  return Error{Code::kUnavailable, fmt::format("{} ended: {}\n{}", name, *ended, child.last_words())};
+}
+
+Result<void> Session::check_heard(const std::string& name, Clock::time_point heard) const {
+  const auto silence = Clock::now() - heard;
+  if (silence < kSilence) return {};
+  return Error{Code::kUnavailable,
+               fmt::format("{} runs but was not heard for {:.1f} s: stalled or cut off", name,
+                           std::chrono::duration<double>(silence).count())};
+}
+
+}  // namespace jostle::services

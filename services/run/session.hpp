@@ -1,0 +1,82 @@
+#pragma once
+/// \file
+/// One run: the processes it starts, the goal it sends, what comes back.
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "services/dds/participant.hpp"
+#include "services/dds/reader.hpp"
+#include "services/dds/topics.hpp"
+#include "services/dds/writer.hpp"
+#include "services/run/options.hpp"
+#include "services/support/child_process.hpp"
+
+namespace jostle::services {
+
+/// Starts workers, simulated world and coordinator, and looks after them:
+///
+///   a worker that ends is replaced; its work goes to the others meanwhile
+///   a world or coordinator that ends, or is silent for kSilence, ends the run
+///   with an error that says which, how, and what it printed last
+///
+/// Destroying it ends every process it started and removes its files.
+class Session {
+ public:
+  /// What a watcher hears.
+  struct Watcher {
+    std::function<void(const jostle_msgs::msg::Feedback&)> on_feedback;
+    std::function<void(const std::string&)> on_notice;  ///< e.g. a worker was replaced
+  };
+
+  /// Error kInvalidArgument, kNotFound, kUnavailable: nothing was started.
+  static Result<std::unique_ptr<Session>> start(const RunOptions& options, Watcher watcher);
+  ~Session();
+
+  /// Sends the goal and waits for its result.
+  /// Errors   kCancelled    a stop was requested; the task was cancelled
+  ///          kUnavailable  a part of the system is gone; the message says which
+  Result<jostle_msgs::msg::GoalResult> perform(std::stop_token stop);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  Session(const RunOptions& options, Watcher watcher, dds::Participant participant,
+          std::filesystem::path folder);
+
+  Result<void> start_processes();
+  Result<ChildProcess> start_worker();
+  Result<void> look_after();
+  Result<void> check_alive(const std::string& name, ChildProcess& child) const;
+  Result<void> check_heard(const std::string& name, Clock::time_point heard) const;
+  void listen();
+  Result<void> send_goal();
+
+  const RunOptions& options_;
+  Watcher watcher_;
+  dds::Participant participant_;
+  std::filesystem::path folder_;  // for logs and the scene; removed at the end
+  std::string goal_id_;
+  bool sent_ = false;
+  int workers_started_ = 0;
+  Clock::time_point goal_deadline_;
+  std::optional<Clock::time_point> coordinator_heard_, world_heard_;
+
+  dds::Writer<jostle_msgs::msg::Goal> goal_;
+  dds::Writer<jostle_msgs::msg::Cancel> cancel_;
+  dds::Inbox<jostle_msgs::msg::Feedback> feedback_;
+  dds::Inbox<jostle_msgs::msg::RobotStatus> world_;
+  dds::Inbox<jostle_msgs::msg::GoalResult> results_;
+
+  std::vector<ChildProcess> workers_;
+  std::vector<Clock::time_point> restarts_;
+  std::optional<ChildProcess> world_process_, coordinator_process_;
+};
+
+}  // namespace jostle::services

@@ -1,0 +1,53 @@
+// jostle sim: a simulated world that takes commands and publishes what it is
+// seen to do.
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+
+#include "services/support/program.hpp"
+#include "services/world_link/simulated_world.hpp"
+
+int main(int argc, char** argv) {
+  using namespace jostle;
+  using namespace jostle::services;
+  CLI::App app("Simulates the world in which actions happen.", "jostle sim");
+  std::string scene_file, level = "none";
+  SimulatedWorldOptions options;
+  dds::ParticipantOptions participant_options{.name = "jostle_sim"};
+  bool with_parent = false;
+  app.add_option("scene", scene_file, "Scene file")->required();
+  app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")
+      ->capture_default_str();
+  app.add_option("--seed", options.seed, "Of the noise")->capture_default_str();
+  app.add_option("--rate", options.rate, "World seconds per second; 0: as fast as possible")
+      ->capture_default_str()->check(CLI::Range(0.0, 1000.0));
+  app.add_flag("--free-running", options.free_running, "Go on between actions instead of standing still");
+  app.add_option("--domain", participant_options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
+  app.add_flag("--die-with-parent", with_parent, "End when the starting process ends");
+  CLI11_PARSE(app, argc, argv);
+  if (with_parent) die_with_parent();
+  const StopSignal signal;
+  set_up_logging("sim");
+
+  const auto fail = [](const Error& error, int code) {
+    spdlog::error("{}", error.message);
+    return code;
+  };
+  auto level_result = physics_pool::parse_uncertainty(level);
+  if (!level_result) return fail(level_result.error(), kExitUsage);
+  options.level = *level_result;
+  auto scene_result = physics_pool::load_scene(scene_file);
+  if (!scene_result) return fail(scene_result.error(), kExitUsage);
+  auto world_result = physics_pool::World::compile(*scene_result);
+  if (!world_result) return fail(world_result.error(), kExitUsage);
+  auto participant_result = dds::Participant::open(participant_options);
+  if (!participant_result) return fail(participant_result.error(), kExitUsage);
+
+  SimulatedWorld world(*participant_result, *world_result, options);
+  spdlog::info("world '{}' of {} objects on domain {}, uncertainty {}", scene_result->name,
+               scene_result->objects.size(), participant_result->domain(), level);
+  if (auto ok = world.run(signal.token()); !ok) return fail(ok.error(), kExitBroken);
+  return kExitOk;
+}

@@ -1,0 +1,54 @@
+#pragma once
+/// \file
+/// Programs that this one starts and looks after.
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::services {
+
+/// A running child. It has a process group of its own, so that Ctrl-C in the
+/// terminal reaches only its parent; its output goes to a log file.
+///
+/// Destroying it ends the child: SIGTERM, and SIGKILL after two seconds.
+class ChildProcess {
+ public:
+  /// Error kNotFound if the program cannot be started; names it.
+  static Result<ChildProcess> start(const std::filesystem::path& program,
+                                    const std::vector<std::string>& arguments,
+                                    const std::filesystem::path& log);
+
+  ChildProcess(ChildProcess&& other) noexcept;
+  ChildProcess& operator=(ChildProcess&& other) noexcept;
+  ~ChildProcess();
+
+  pid_t pid() const { return pid_; }
+
+  /// How it ended ("killed by signal 9", "exit code 1"), or nothing while it runs.
+  std::optional<std::string> ended();
+
+  /// Waits until it has ended, and says how.
+  std::string wait();
+
+  /// Asks it to end, without waiting.
+  void terminate();
+
+  /// The last lines it printed, for an error message.
+  std::string last_words() const;
+
+ private:
+  ChildProcess(pid_t pid, std::filesystem::path log) : pid_(pid), log_(std::move(log)) {}
+  void end();
+
+  pid_t pid_ = -1;  // -1: moved from, or seen to have ended
+  std::filesystem::path log_;
+  std::optional<std::string> ended_;
+};
+
+}  // namespace jostle::services

@@ -1,0 +1,59 @@
+#include "services/support/program.hpp"
+
+#include <csignal>
+#include <pthread.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <thread>
+
+namespace jostle::services {
+namespace {
+
+std::stop_source& stop_source() {
+  static std::stop_source source;
+  return source;
+}
+
+sigset_t stop_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  return set;
+}
+
+}  // namespace
+
+// Blocked in every thread and waited for in one: a stop request takes locks,
+// which a signal handler must not.
+StopSignal::StopSignal() {
+  const sigset_t set = stop_signals();
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  std::thread([set] {
+    int signal = 0;
+    sigwait(&set, &signal);
+    stop_source().request_stop();
+    // A second one ends a program that does not end by itself.
+    pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
+    for (;;) pause();
+  }).detach();
+}
+
+std::stop_token StopSignal::token() const { return stop_source().get_token(); }
+
+void die_with_parent() {
+  const pid_t parent = getppid();
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (getppid() != parent || parent == 1) raise(SIGTERM);  // it ended before we asked
+}
+
+void set_up_logging(const std::string& name) {
+  auto logger = spdlog::stderr_color_mt(name);
+  logger->set_pattern("%n: %^%l%$: %v");
+  spdlog::set_default_logger(std::move(logger));
+}
+
+}  // namespace jostle::services

@@ -1,0 +1,117 @@
+#include "services/world_link/world_client.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "services/world_link/messages.hpp"
+
+namespace jostle::services {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::size_t kQueue = 64;  // a few seconds of states
+
+// Later runs have larger epochs, so a world can tell an old commander's
+// command from a new one's.
+std::uint64_t epoch_now() {
+  return static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
+}
+
+Error silent(const char* who, const std::string& topic, std::chrono::milliseconds time, bool heard) {
+  return {Code::kUnavailable,
+          heard ? fmt::format("{}: nothing heard on {} for {:.1f} s; the process ended or is stalled", who,
+                              topic, time.count() / 1e3)
+                : fmt::format("{}: nobody publishes {} ({:.1f} s waited); start one with `jostle sim SCENE` "
+                              "on the same ROS_DOMAIN_ID", who, topic, time.count() / 1e3)};
+}
+
+}  // namespace
+
+RobotClient::RobotClient(const dds::Participant& participant, const WorldClientOptions& options)
+    : options_(options),
+      status_(participant, topics::kRobotStatus, kQueue),
+      command_(participant, topics::kRobotCommand),
+      epoch_(epoch_now()) {}
+
+Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::stop_token stop) {
+  const auto patience = heard_ ? options_.silence : options_.start;
+  auto status = status_.take(steady_clock::now() + patience, stop);
+  if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped on request"};
+  if (!status) return silent("robot", topics::kRobotStatus.name, patience, heard_);
+  heard_ = true;
+  time_ = seconds(status->header());
+  return *std::move(status);
+}
+
+Result<robot_bridge::RobotReading> RobotClient::read() {
+  status_.take_all();  // yesterday's news
+  for (;;) {
+    auto status_result = next_status({});
+    if (!status_result) return status_result.error();
+    const bool current = sequence_number_ == 0 || (status_result->epoch() == epoch_ &&
+                                                   status_result->sequence_number() == sequence_number_);
+    if (!current || status_result->busy()) continue;
+    auto reading_result = from_message(*status_result);
+    if (!reading_result) {
+      return Error{reading_result.error().code,
+                   topics::kRobotStatus.name + ": " + reading_result.error().message};
+    }
+    return reading_result;
+  }
+}
+
+Result<void> RobotClient::execute(std::span<const double> u, double duration, std::stop_token stop) {
+  if (auto ok = validate_command(u, duration); !ok) return ok;
+  if (!command_.wait_for_readers(steady_clock::now() + options_.start)) {
+    return silent("robot", topics::kRobotCommand.name, options_.start, false);
+  }
+  jostle_msgs::msg::VelocityCommand command;
+  command.header(make_header(time_));
+  command.epoch(epoch_);
+  command.sequence_number(++sequence_number_);
+  command.velocities().assign(u.begin(), u.end());
+  command.duration(duration);
+  if (!command_.write(command)) {
+    return Error{Code::kUnavailable, "robot: the middleware took no command on " + topics::kRobotCommand.name};
+  }
+  for (;;) {
+    auto status_result = next_status(stop);
+    if (!status_result) return status_result.error();
+    if (status_result->epoch() != epoch_) continue;
+    if (!status_result->error().empty()) {
+      return Error{Code::kInvalidArgument, "robot: " + status_result->error()};
+    }
+    if (status_result->sequence_number() >= sequence_number_) return {};
+  }
+}
+
+ObjectsClient::ObjectsClient(const dds::Participant& participant, const RobotClient& robot,
+                             const WorldClientOptions& options)
+    : robot_(robot), options_(options), states_(participant, topics::kObjectStates, kQueue) {}
+
+Result<std::vector<perception::ObjectReading>> ObjectsClient::read() {
+  const auto patience = time_ < 0 ? options_.start : options_.silence;
+  const auto deadline = steady_clock::now() + patience;
+  std::string problem;
+  constexpr double kSameTime = 1e-6;  // s, rounding of stamps
+  while (newest_.empty() || time_ < robot_.time() - kSameTime) {
+    auto message = states_.take(deadline);
+    if (!message) {
+      if (problem.empty()) return silent("objects", topics::kObjectStates.name, patience, time_ >= 0);
+      return Error{Code::kInvalidArgument, problem + "; no good measurement followed"};
+    }
+    auto readings_result = from_message(*message);
+    if (readings_result) {
+      newest_ = std::move(readings_result).value();
+      time_ = seconds(message->header());
+    } else {
+      ++rejected_;
+      problem = topics::kObjectStates.name + ": " + readings_result.error().message;
+      spdlog::warn("{}; measurement {} rejected", problem, rejected_);
+    }
+  }
+  return newest_;
+}
+
+}  // namespace jostle::services

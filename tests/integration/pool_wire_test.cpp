@@ -1,0 +1,198 @@
+// What a worker makes of messages that no honest client would send.
+
+#include <gmock/gmock.h>
+
+#include "idl/convert/pool.hpp"
+#include "services/dds/reader.hpp"
+#include "services/dds/topics.hpp"
+#include "tests/support/batches.hpp"
+#include "tests/support/worker_process.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace jostle_msgs::msg;
+using physics_pool::Scene;
+using ::testing::HasSubstr;
+
+constexpr auto kPatience = 60s;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// A client made by hand, and one worker.
+class PoolWire : public ::testing::Test {
+ protected:
+  PoolWire() {
+    worker_id = hear_worker();
+    tasks = std::make_unique<dds::Writer<Task>>(participant, topics::pool_task(worker_id));
+    EXPECT_TRUE(tasks->wait_for_readers(in(kPatience)));
+    announce(physics_pool::scene_hash(scene), physics_pool::to_yaml(scene));
+  }
+
+  // Waits until the worker hears us too, and gives its id.
+  std::uint64_t hear_worker() {
+    while (auto heartbeat = heartbeats.take(in(kPatience))) {
+      for (const ClientLoad& client : heartbeat->clients()) {
+        if (client.client() == participant.id()) return heartbeat->worker();
+      }
+    }
+    throw std::runtime_error("the worker was not heard");
+  }
+
+  void announce(const Hash& hash, const std::string& text) {
+    WorldDescription description;
+    description.high(hash.high);
+    description.low(hash.low);
+    description.scene(text);
+    EXPECT_TRUE(worlds.write(description));
+  }
+
+  Task good_task() {
+    Task task;
+    task.client(participant.id());
+    task.epoch(++epoch);
+    task.batch(convert::to_wire(push_batch(scene, 2)));
+    task.best_cost(physics_pool::kInfinity);
+    task.first_success(UINT32_MAX);
+    task.samples({0, 1});
+    return task;
+  }
+
+  // The first answer to a task; an empty one if none comes.
+  TaskResult ask(const Task& task) {
+    tasks->write(task);
+    while (auto result = results.take(in(kPatience))) {
+      if (result->epoch() == task.epoch()) return *result;
+    }
+    ADD_FAILURE() << "no answer";
+    return {};
+  }
+
+  void expect_still_serves() {
+    const TaskResult result = ask(good_task());
+    EXPECT_EQ(result.error(), "");
+    EXPECT_EQ(result.steps(), 3u);
+  }
+
+  const int domain = test_domain();
+  const Scene scene = small_scene();
+  const WorkerProcess worker{domain};
+  const dds::Participant participant = dds::Participant::open({.domain = domain}).value();
+  dds::Inbox<WorkerHeartbeat> heartbeats{participant, topics::kPoolWorker, 10};
+  dds::Inbox<TaskResult> results{participant, topics::kPoolResult, 100};
+  dds::Writer<WorldDescription> worlds{participant, topics::kPoolWorld};
+  dds::Writer<BatchControl> controls{participant, topics::kPoolControl};
+  std::unique_ptr<dds::Writer<Task>> tasks;
+  std::uint64_t worker_id = 0;
+  std::uint64_t epoch = 0;
+};
+
+TEST_F(PoolWire, MalformedTaskIsAnsweredWithTheFieldsName) {
+  const std::pair<const char*, std::function<void(Task&)>> cases[] = {
+      {"x0.q[0]", [](Task& t) { t.batch().q()[0] = kNaN; }},
+      {"x0.v", [](Task& t) { t.batch().v().resize(3); }},
+      {"x0", [](Task& t) { t.batch().q().resize(200'000); }},
+      {"nominal.nu", [](Task& t) { t.batch().nu(-7); }},
+      {"nominal.nu", [](Task& t) { t.batch().nu(2'000'000'000); }},
+      {"nominal.values", [](Task& t) { t.batch().nominal().resize(4 * 20'000); }},
+      {"nominal.values", [](Task& t) { t.batch().nominal().resize(5); }},
+      {"u_before", [](Task& t) { t.batch().u_before().clear(); }},
+      {"step_duration", [](Task& t) { t.batch().step_duration(1e300); }},
+      {"step_duration", [](Task& t) { t.batch().step_duration(-1); }},
+      {"law.sigma", [](Task& t) { t.batch().sigma().clear(); }},
+      {"law.limit[3]", [](Task& t) { t.batch().limit()[3] = kNaN; }},
+      {"samples", [](Task& t) { t.batch().samples(1'000'000'000); }},
+      {"first_sample", [](Task& t) { t.batch().first_sample(UINT32_MAX); }},
+      {"min_steps", [](Task& t) { t.batch().min_steps(-1); }},
+      {"incumbent", [](Task& t) { t.batch().incumbent(kNaN); }},
+      {"objective.goal", [](Task& t) { t.batch().objective().goal(kNaN); }},
+      {"wait", [](Task& t) { t.batch().wait(INT64_MAX); }},
+      {"wait", [](Task& t) { t.batch().wait(-2); }},
+      {"task.samples", [](Task& t) { t.samples({}); }},
+      {"task.samples", [](Task& t) { t.samples({0, 7}); }},
+      {"task.samples", [](Task& t) { t.samples(std::vector<std::uint32_t>(100'000, 0)); }},
+      {"task.best_cost", [](Task& t) { t.best_cost(kNaN); }},
+  };
+  for (const auto& [field, spoil] : cases) {
+    Task task = good_task();
+    spoil(task);
+    const TaskResult result = ask(task);
+    EXPECT_THAT(result.error(), HasSubstr(std::string(field) + ": got"));
+    EXPECT_EQ(result.error_code(), static_cast<int>(Code::kInvalidArgument)) << field;
+    EXPECT_EQ(result.worker(), worker_id);
+  }
+  expect_still_serves();
+}
+
+TEST_F(PoolWire, WorldWhoseHashLiesIsRefused) {
+  const Hash claimed{.high = 1, .low = 2};
+  announce(claimed, physics_pool::to_yaml(scene));
+  Task task = good_task();
+  task.batch().world(convert::to_wire(claimed));
+
+  const TaskResult result = ask(task);
+
+  EXPECT_THAT(result.error(), HasSubstr(to_string(claimed)));
+  EXPECT_THAT(result.error(), HasSubstr(to_string(physics_pool::scene_hash(scene))));
+  expect_still_serves();
+}
+
+TEST_F(PoolWire, LieAboutAKnownWorldChangesNothing) {
+  expect_still_serves();
+  announce(physics_pool::scene_hash(scene), "nonsense");
+  expect_still_serves();
+}
+
+TEST_F(PoolWire, WorldThatIsNoSceneIsRefused) {
+  for (const std::string text : {"", "[", "jostle_scene: 1\n", "{a: &x [*x]}"}) {
+    announce(hash_of(text), text);
+    Task task = good_task();
+    task.batch().world(convert::to_wire(hash_of(text)));
+    EXPECT_THAT(ask(task).error(), HasSubstr(to_string(hash_of(text)))) << text;
+  }
+  expect_still_serves();
+}
+
+TEST_F(PoolWire, TaskWaitsForItsWorld) {
+  const Scene late = small_scene(2);
+  Task task = good_task();
+  task.batch(convert::to_wire(push_batch(late, 2)));
+  tasks->write(task);
+  expect_still_serves();  // a task that waits holds up no other
+
+  announce(physics_pool::scene_hash(late), physics_pool::to_yaml(late));
+
+  const auto result = results.take(in(kPatience));  // of this task or the second sample above
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->error(), "");
+  EXPECT_TRUE(eventually(in(kPatience), [&] {
+    const auto next = results.take(in(1s));
+    return next && next->epoch() == task.epoch() && next->error().empty();
+  }));
+}
+
+TEST_F(PoolWire, WorldThatNeverComesIsAnErrorAfterAWhile) {
+  Task task = good_task();
+  task.batch().world(convert::to_wire(Hash{.high = 0xfeed, .low = 0xbeef}));
+
+  const TaskResult result = ask(task);
+
+  EXPECT_EQ(result.error_code(), static_cast<int>(Code::kUnknownWorld));
+  EXPECT_THAT(result.error(), HasSubstr("000000000000feed000000000000beef"));
+  expect_still_serves();
+}
+
+TEST_F(PoolWire, NonsenseNewsOfABatchAreIgnored) {
+  BatchControl control;
+  control.client(participant.id());
+  for (const int kind : {0, 1, 2, 3, 255}) {
+    control.kind(static_cast<std::uint8_t>(kind));
+    control.cost(kNaN);
+    control.epoch(12345);
+    EXPECT_TRUE(controls.write(control));
+  }
+  expect_still_serves();
+}
+
+}  // namespace
+}  // namespace jostle::tests

@@ -17,6 +17,9 @@ using eprosima::fastdds::dds::DomainParticipant;
 using eprosima::fastdds::dds::DomainParticipantFactory;
 using eprosima::fastdds::dds::DomainParticipantQos;
 
+// Bytes; holds a burst of trajectories. The kernel gives less where
+// net.core.rmem_max is lower, and lost packets are then sent again.
+constexpr std::uint32_t kSocketBuffer = 4 << 20;
 constexpr int kLargestDomain = 232;  // RTPS 2.2, 9.6.1.1: ports would pass 65535 beyond
 
 Result<int> choose_domain(const std::optional<int>& wanted) {
@@ -41,12 +44,13 @@ Result<int> choose_domain(const std::optional<int>& wanted) {
 
 Result<Transport> choose_transport(const std::optional<Transport>& wanted) {
   if (wanted) return *wanted;
+  const bool has_profile = std::getenv("FASTRTPS_DEFAULT_PROFILES_FILE") != nullptr;
   const char* text = std::getenv("JOSTLE_DDS_TRANSPORT");
-  const std::string_view word = text ? text : "default";
-  if (word == "default") return Transport::kDefault;
+  const std::string_view word = text ? text : has_profile ? "default" : "udp";
   if (word == "udp") return Transport::kUdp;
+  if (word == "default") return Transport::kDefault;
   return Error{Code::kInvalidArgument,
-               fmt::format("JOSTLE_DDS_TRANSPORT: got '{}', wanted one of: default, udp", word)};
+               fmt::format("JOSTLE_DDS_TRANSPORT: got '{}', wanted one of: udp, default", word)};
 }
 
 DomainParticipantQos make_qos(const std::string& name, Transport transport) {
@@ -58,8 +62,9 @@ DomainParticipantQos make_qos(const std::string& name, Transport transport) {
   discovery.leaseDuration_announcementperiod = {0, 250'000'000};
   if (transport == Transport::kUdp) {
     qos.transport().use_builtin_transports = false;
-    qos.transport().user_transports.assign(
-        1, std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
+    const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+    udp->sendBufferSize = udp->receiveBufferSize = kSocketBuffer;
+    qos.transport().user_transports.assign(1, udp);
   }
   return qos;
 }

@@ -93,6 +93,7 @@ msg::BatchDescription to_wire(const RolloutBatch& batch) {
   wire.step_duration(batch.step_duration);
   wire.sigma(batch.law.sigma);
   wire.limit(batch.law.limit);
+  wire.scales(batch.law.scales);
   wire.seed(batch.law.seed);
   wire.stream(batch.law.stream);
   wire.first_sample(batch.first_sample);
@@ -114,7 +115,11 @@ RolloutBatch from_wire(const msg::BatchDescription& wire) {
   batch.nominal = {.nu = wire.nu(), .values = wire.nominal()};
   batch.u_before = wire.u_before();
   batch.step_duration = wire.step_duration();
-  batch.law = {.sigma = wire.sigma(), .limit = wire.limit(), .seed = wire.seed(), .stream = wire.stream()};
+  batch.law = {.sigma = wire.sigma(),
+               .limit = wire.limit(),
+               .scales = wire.scales(),
+               .seed = wire.seed(),
+               .stream = wire.stream()};
   batch.first_sample = wire.first_sample();
   batch.samples = wire.samples();
   batch.objective = from_wire(wire.objective());

@@ -46,14 +46,16 @@ Result<void> check_weights(const Objective& o) {
 ControlSequence sample_controls(const ControlSequence& nominal, const SamplingLaw& law,
                                 std::uint32_t sample) {
   ControlSequence controls = nominal;
+  const double scale = law.scales[sample % law.scales.size()];
   for (int t = 0; t < nominal.steps(); ++t) {
     const std::span<double> u = controls.step(t);
     for (std::size_t i = 0; i < u.size(); ++i) {
       if (law.sigma[i] > 0) {
-        u[i] += law.sigma[i] * standard_normal(law.seed, {.stream = law.stream,
-                                                          .sample = sample,
-                                                          .step = static_cast<std::uint32_t>(t),
-                                                          .axis = static_cast<std::uint32_t>(i)});
+        u[i] += scale * law.sigma[i] *
+                standard_normal(law.seed, {.stream = law.stream,
+                                           .sample = sample,
+                                           .step = static_cast<std::uint32_t>(t),
+                                           .axis = static_cast<std::uint32_t>(i)});
       }
       u[i] = std::clamp(u[i], -law.limit[i], law.limit[i]);
     }
@@ -110,12 +112,21 @@ Result<void> validate(const RolloutBatch& batch) {
   if (auto ok = check_size("law.sigma", batch.law.sigma.size(), nu); !ok) return ok;
   if (auto ok = check_size("law.limit", batch.law.limit.size(), nu); !ok) return ok;
   for (std::size_t i = 0; i < nu; ++i) {
-    if (!(batch.law.sigma[i] >= 0)) {
-      return wrong(fmt::format("law.sigma[{}]", i), fmt::format("{}", batch.law.sigma[i]), ">= 0");
+    if (!(batch.law.sigma[i] >= 0 && std::isfinite(batch.law.sigma[i]))) {
+      return wrong(fmt::format("law.sigma[{}]", i), fmt::format("{}", batch.law.sigma[i]), "a finite number >= 0");
     }
     if (!(batch.law.limit[i] > 0)) {
       return wrong(fmt::format("law.limit[{}]", i), fmt::format("{}", batch.law.limit[i]), "> 0");
     }
+  }
+  if (batch.law.scales.empty() || batch.law.scales.size() > kMaxScales) {
+    return wrong("law.scales", fmt::format("{} values", batch.law.scales.size()),
+                 fmt::format("1 to {}", kMaxScales));
+  }
+  for (std::size_t i = 0; i < batch.law.scales.size(); ++i) {
+    const double scale = batch.law.scales[i];
+    if (scale >= 0 && std::isfinite(scale)) continue;
+    return wrong(fmt::format("law.scales[{}]", i), fmt::format("{}", scale), "a finite number >= 0");
   }
   if (auto ok = check_finite("x0.q", batch.x0.q); !ok) return ok;
   if (auto ok = check_finite("x0.v", batch.x0.v); !ok) return ok;

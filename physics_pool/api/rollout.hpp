@@ -20,13 +20,16 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// How sample k's controls follow from the nominal ones:
 ///
-///   u[k][t][i] = clamp(U[t][i] + sigma[i] · z, -limit[i], +limit[i])
+///   u[k][t][i] = clamp(U[t][i] + scales[k mod m]·sigma[i]·z, -limit[i], +limit[i])
 ///   z = standard normal, a pure function of (seed, stream, k, t, i)
 ///
 /// Any worker can make any sample; sigma = 0 gives the clamped nominal controls.
 struct SamplingLaw {
   std::vector<double> sigma;  ///< [nu] standard deviations, m/s and rad/s, >= 0
   std::vector<double> limit;  ///< [nu] largest magnitudes, m/s and rad/s, > 0
+  /// [m] factors of sigma, dealt out to the samples in turn, >= 0: a batch can
+  /// refine and explore at once.
+  std::vector<double> scales{1.0};
   std::uint64_t seed = 0;
   std::uint32_t stream = 0;  ///< the planner's iteration: same seed, fresh noise
 };
@@ -100,6 +103,7 @@ inline constexpr std::uint32_t kMaxSamples = 1'000'000;
 inline constexpr int kMaxSteps = 10'000;
 inline constexpr double kMaxStepDuration = 60.0;         // seconds
 inline constexpr std::size_t kMaxStateSize = 100'000;    // numbers in q or v
+inline constexpr std::size_t kMaxScales = 1'000;
 inline constexpr std::chrono::seconds kMaxWait{10};
 
 }  // namespace jostle::physics_pool

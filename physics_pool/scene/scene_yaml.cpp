@@ -119,9 +119,7 @@ std::string to_yaml(const Scene& scene) {
   line("surface:");
   line("  kind: {}", scene.surface.kind == Surface::Kind::kTable ? "table" : "shelf");
   line("  size: [{}, {}]", scene.surface.size[0], scene.surface.size[1]);
-  if (scene.surface.kind == Surface::Kind::kShelf) {
-    line("  wall_height: {}", scene.surface.wall_height);
-  }
+  line("  wall_height: {}", scene.surface.wall_height);
   line("robot:");
   line("  model: {}", quoted(scene.robot.model));
   line("  start: {{x: {}, y: {}, rotation: {}, opening: {}}}", scene.robot.x, scene.robot.y,

@@ -41,7 +41,8 @@ class Run {
         on_event_(on_event),
         stop_(std::move(stop)),
         start_(steady_clock::now()),
-        deadline_(start_ + options.timeout) {}
+        deadline_(start_ + options.timeout),
+        replan_iterations_(options.few_iterations) {}
 
   Result<Outcome> go() {
     auto ok = options_.method == ControlOptions::Method::kOnline ? online() : naive();
@@ -66,13 +67,26 @@ class Run {
       const bool deviated = state_deviation(layout(), plan_.states.front(), x_) > options_.deviation_threshold;
       const bool few_left = plan_.controls.steps() < std::max(options_.min_steps, 1);
       if (!plan_.grasped || deviated || few_left) {
-        ControlSequence controls = plan_.controls;
-        controls.append(straight_step(plan_.states.back()));
-        ++outcome_.replans;
-        if (auto ok = plan(controls, options_.few_iterations); !ok) return ok;
+        if (auto ok = replan(); !ok) return ok;
       }
     }
     return finish();
+  }
+
+  // Lines 11 and 12. Where the last plan fell short of the target the horizon
+  // is filled up again, so that there is time to go round, and the iterations
+  // grow.
+  Result<void> replan() {
+    const int wanted = plan_.grasped ? plan_.controls.steps() + 1
+                                     : std::max(plan_.controls.steps() + 1, options_.initial_steps);
+    ControlSequence controls = plan_.controls;
+    while (controls.steps() < wanted) controls.append(straight_step(plan_.states.back()));
+    ++outcome_.replans;
+    if (auto ok = plan(controls, replan_iterations_); !ok) return ok;
+    replan_iterations_ = plan_.grasped ? options_.few_iterations
+                                       : std::min(replan_iterations_ * std::max(options_.few_growth, 1),
+                                                  options_.many_iterations);
+    return {};
   }
 
   // Alg. 3.
@@ -147,12 +161,17 @@ class Run {
   }
 
   Result<void> finish() {
+    const bool reached = in_hand_;
+    if (reached && outcome_.dropped.empty() && options_.close_hand) {
+      if (auto ok = close_hand(); !ok) return ok;
+    }
     if (!outcome_.dropped.empty()) {
       outcome_.reason = fmt::format("dropped {}", fmt::join(outcome_.dropped, ", "));
     } else if (in_hand_) {
       outcome_.success = true;
       outcome_.reason = "target grasped";
-      if (options_.close_hand) return close_hand();
+    } else if (reached) {
+      outcome_.reason = "target slipped out of the closing hand";
     } else {
       outcome_.success = plan_.grasped;
       outcome_.reason = plan_.grasped ? "plan reaches the target; not executed"
@@ -211,6 +230,7 @@ class Run {
   Plan plan_;
   bool plan_made_ = false;
   std::uint32_t stream_ = 0;
+  int replan_iterations_;  // FewIter, grown
   Outcome outcome_;
 };
 

@@ -29,7 +29,10 @@ struct Pbsto::Run {
     batch.nominal = nominal;
     batch.u_before.assign(static_cast<std::size_t>(nominal.nu), 0.0);
     batch.step_duration = options.step_duration;
-    batch.law = {.sigma = options.sigma, .limit = options.limit, .seed = problem.seed};
+    batch.law = {.sigma = options.sigma,
+                 .limit = options.limit,
+                 .scales = options.scales,
+                 .seed = problem.seed};
     batch.objective = options.objective;
     batch.stop_on_success = true;
     batch.min_steps = options.min_steps;

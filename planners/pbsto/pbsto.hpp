@@ -18,6 +18,9 @@ struct PbstoOptions {
   /// opening [m/s].
   std::vector<double> sigma{0.04, 0.04, 0.25, 0.004};
   std::vector<double> limit{0.15, 0.15, 0.8, 0.05};  ///< largest controls, same units
+  /// Factors of sigma dealt out to the K samples in turn. Small ones first: of
+  /// several samples that succeed the one with the lowest index is taken.
+  std::vector<double> scales{0.125, 0.25, 0.5, 1.0};
   Update update = Update::kGreedy;
   double lambda = 100.0;       ///< of Eq. 5.8, in units of cost; small is greedy
   int min_steps = 2;           ///< n_min of Alg. 1

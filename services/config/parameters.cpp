@@ -1,5 +1,7 @@
 #include "services/config/parameters.hpp"
 
+#include <cmath>
+
 #include "physics_pool/scene/yaml_fields.hpp"
 #include "services/support/files.hpp"
 
@@ -16,7 +18,8 @@ void read_axes(yaml::Fields& fields, const char* key, std::vector<double>& value
   values.assign(axes.begin(), axes.end());
 }
 
-Parameters read(const YAML::Node& root, const std::string& origin) {
+// `timeout` is checked before it becomes a duration, s.
+Parameters read(const YAML::Node& root, const std::string& origin, double& timeout) {
   Parameters parameters;
   PbstoOptions& planner = parameters.planner;
   ControlOptions& control = parameters.control;
@@ -28,6 +31,7 @@ Parameters read(const YAML::Node& root, const std::string& origin) {
     in.optional("rollouts", planner.rollouts);
     read_axes(in, "sigma", planner.sigma);
     read_axes(in, "limit", planner.limit);
+    in.optional("scales", planner.scales);
     in.choice<PbstoOptions::Update>("update", planner.update,
         {{"greedy", PbstoOptions::Update::kGreedy}, {"cost-weighted", PbstoOptions::Update::kCostWeighted}});
     in.optional("lambda", planner.lambda);
@@ -52,13 +56,12 @@ Parameters read(const YAML::Node& root, const std::string& origin) {
   fields.section("control", false, [&](yaml::Fields& in) {
     in.optional("many_iterations", control.many_iterations);
     in.optional("few_iterations", control.few_iterations);
+    in.optional("few_growth", control.few_growth);
     in.optional("deviation_threshold", control.deviation_threshold);
     in.optional("initial_steps", control.initial_steps);
     in.optional("straight_speed", control.straight_speed);
     in.optional("close_hand", control.close_hand);
-    double timeout = std::chrono::duration<double>(control.timeout).count();
     in.optional("timeout", timeout);
-    control.timeout = std::chrono::milliseconds(static_cast<long>(timeout * 1e3));
   });
   fields.finish();
   control.step_duration = planner.step_duration;
@@ -66,11 +69,43 @@ Parameters read(const YAML::Node& root, const std::string& origin) {
   return parameters;
 }
 
+// A key, its value and the closed range it must lie in.
+struct Range {
+  const char* key;
+  double value, low, high;
+};
+
+// Weights are checked with every batch; this is what no batch carries.
+Result<void> check(const Parameters& parameters, double timeout, const std::string& origin) {
+  const PbstoOptions& planner = parameters.planner;
+  const ControlOptions& control = parameters.control;
+  for (const Range& range : {Range{"planner.rollouts", double(planner.rollouts), 1, physics_pool::kMaxSamples},
+                             Range{"planner.lambda", planner.lambda, 1e-9, 1e12},
+                             Range{"min_steps", double(planner.min_steps), 0, physics_pool::kMaxSteps},
+                             Range{"step_duration", planner.step_duration, 1e-3, physics_pool::kMaxStepDuration},
+                             Range{"control.many_iterations", double(control.many_iterations), 0, 1e6},
+                             Range{"control.few_iterations", double(control.few_iterations), 0, 1e6},
+                             Range{"control.few_growth", double(control.few_growth), 1, 1000},
+                             Range{"control.deviation_threshold", control.deviation_threshold, 0, 1e6},
+                             Range{"control.initial_steps", double(control.initial_steps), 1, physics_pool::kMaxSteps},
+                             Range{"control.straight_speed", control.straight_speed, 0, 1},
+                             Range{"control.timeout", timeout, 1, 1e6}}) {
+    if (range.value >= range.low && range.value <= range.high) continue;  // false for NaN
+    return Error{Code::kInvalidArgument, fmt::format("{}: {}: got {}, wanted {} to {}", origin, range.key,
+                                                     range.value, range.low, range.high)};
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Parameters> parse_parameters(std::string_view text, const std::string& origin) {
   try {
-    return read(YAML::Load(std::string(text)), origin);
+    double timeout = std::chrono::duration<double>(ControlOptions{}.timeout).count();
+    Parameters parameters = read(YAML::Load(std::string(text)), origin, timeout);
+    if (auto ok = check(parameters, timeout, origin); !ok) return ok.error();
+    parameters.control.timeout = std::chrono::milliseconds(std::llround(timeout * 1e3));
+    return parameters;
   } catch (const yaml::Malformed& malformed) {
     return Error{Code::kInvalidArgument, malformed.message};
   } catch (const YAML::Exception& error) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robot_bridge/safety/command_check.hpp"
+
 namespace jostle::services {
 
 std::vector<perception::ObjectReading> object_readings(const StateLayout& layout, const State& x) {
@@ -29,6 +31,7 @@ Result<robot_bridge::RobotReading> SimulatedRobot::read() {
 }
 
 Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {
+  if (auto ok = robot_bridge::check_command(u, duration); !ok) return ok;
   world_.begin(u);
   const long steps = std::lround(duration / world_.world().time_step());
   for (long i = 0; i < steps; ++i) {

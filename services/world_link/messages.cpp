@@ -10,10 +10,6 @@
 namespace jostle::services {
 namespace {
 
-// No planar gripper is faster; a larger number is a mistake of the sender.
-constexpr double kFastest = 2.0;       // m/s, rad/s
-constexpr double kLongestAction = 60;  // s
-
 geometry_msgs::msg::Vector3 to_vector(const std::array<double, 3>& values) {
   geometry_msgs::msg::Vector3 vector;
   vector.x(values[0]);
@@ -155,23 +151,6 @@ Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotSta
   }
   return robot_bridge::RobotReading{
       .q = message.q(), .v = message.v(), .object_in_hand = message.object_in_hand()};
-}
-
-Result<void> validate_command(std::span<const double> u, double duration) {
-  if (u.size() != kControlAxes) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("velocities: got {} values, wanted {}", u.size(), int{kControlAxes})};
-  }
-  for (std::size_t i = 0; i < u.size(); ++i) {
-    if (std::abs(u[i]) <= kFastest) continue;  // false for NaN
-    return Error{Code::kInvalidArgument,
-                 fmt::format("velocities[{}]: got {}, wanted -{} to {} m/s or rad/s", i, u[i], kFastest, kFastest)};
-  }
-  if (!(duration > 0 && duration <= kLongestAction)) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("duration: got {} s, wanted more than 0, at most {} s", duration, kLongestAction)};
-  }
-  return {};
 }
 
 }  // namespace jostle::services

@@ -3,7 +3,6 @@
 /// The robot and its objects as messages. Whatever comes from the wire is
 /// checked here before anyone calculates with it.
 
-#include <span>
 #include <string>
 #include <vector>
 
@@ -33,8 +32,5 @@ tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates&
 
 /// Error kInvalidArgument naming the field.
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message);
-
-/// Checks a control: size, finiteness, magnitude; and its duration.
-Result<void> validate_command(std::span<const double> u, double duration);
 
 }  // namespace jostle::services

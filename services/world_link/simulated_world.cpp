@@ -5,6 +5,7 @@
 #include <cmath>
 #include <thread>
 
+#include "robot_bridge/safety/command_check.hpp"
 #include "services/simulation/in_process_world.hpp"
 #include "services/world_link/messages.hpp"
 
@@ -65,7 +66,7 @@ void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
     actions_.clear();
   }
   accepted_ = command.sequence_number();
-  if (auto ok = validate_command(command.velocities(), command.duration()); !ok) {
+  if (auto ok = robot_bridge::check_command(command.velocities(), command.duration()); !ok) {
     error_ = fmt::format("command {}: {}", command.sequence_number(), ok.error().message);
     spdlog::warn("{}; refused", error_);
     publish();

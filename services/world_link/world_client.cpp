@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "robot_bridge/safety/command_check.hpp"
 #include "services/world_link/messages.hpp"
 
 namespace jostle::services {
@@ -62,7 +63,7 @@ Result<robot_bridge::RobotReading> RobotClient::read() {
 }
 
 Result<void> RobotClient::execute(std::span<const double> u, double duration, std::stop_token stop) {
-  if (auto ok = validate_command(u, duration); !ok) return ok;
+  if (auto ok = robot_bridge::check_command(u, duration); !ok) return ok;
   if (!command_.wait_for_readers(steady_clock::now() + options_.start)) {
     return silent("robot", topics::kRobotCommand.name, options_.start, false);
   }

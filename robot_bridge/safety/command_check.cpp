@@ -1,0 +1,28 @@
+#include "robot_bridge/safety/command_check.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "idl/types/state.hpp"
+
+namespace jostle::robot_bridge {
+
+Result<void> check_command(std::span<const double> u, double duration) {
+  if (u.size() != kControlAxes) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("velocities: got {} values, wanted {}", u.size(), int{kControlAxes})};
+  }
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    if (std::abs(u[i]) <= kFastest) continue;  // false for NaN
+    return Error{Code::kInvalidArgument, fmt::format("velocities[{}]: got {}, wanted -{} to {} m/s or rad/s",
+                                                     i, u[i], kFastest, kFastest)};
+  }
+  if (!(duration > 0 && duration <= kLongestAction)) {
+    return Error{Code::kInvalidArgument, fmt::format("duration: got {} s, wanted more than 0, at most {} s",
+                                                     duration, kLongestAction)};
+  }
+  return {};
+}
+
+}  // namespace jostle::robot_bridge

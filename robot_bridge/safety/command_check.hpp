@@ -1,0 +1,20 @@
+#pragma once
+/// \file
+/// What every command must pass before it moves anything.
+
+#include <span>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::robot_bridge {
+
+/// Faster or longer is a mistake of the sender, whatever the robot.
+inline constexpr double kFastest = 2.0;         // m/s, rad/s
+inline constexpr double kLongestAction = 60.0;  // s
+
+/// Checks a control (x, y [m/s], rotation [rad/s], opening [m/s]) held for
+/// `duration` seconds.
+/// Error kInvalidArgument naming the field, what it got and what it wanted.
+Result<void> check_command(std::span<const double> u, double duration);
+
+}  // namespace jostle::robot_bridge

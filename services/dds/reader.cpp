@@ -22,39 +22,42 @@ DataReaderQos reader_qos(const Participant::Core& core, const Qos& qos) {
 }  // namespace
 
 struct ReaderBase::Impl : DataReaderListener {
-  Impl(Participant owner, void* buffer, std::function<void()> callback)
-      : participant(std::move(owner)), scratch(buffer), on_sample(std::move(callback)) {}
+  Impl(Participant owner, TypeSupport type_support, std::function<void(const void*)> callback)
+      : participant(std::move(owner)), type(std::move(type_support)), on_sample(std::move(callback)) {}
 
   void on_data_available(DataReader* source) override {
-    const std::lock_guard lock(mutex);
-    if (closed) return;
+    const auto destroy = [this](void* sample) { type.delete_data(sample); };
+    const std::unique_ptr<void, decltype(destroy)> sample(type.create_data(), destroy);
     SampleInfo info;
-    while (source->take_next_sample(scratch, &info) == ReturnCode_t::RETCODE_OK) {
-      if (info.valid_data) call();
+    // The mutex is not held while taking: the middleware has locks of its own.
+    while (source->take_next_sample(sample.get(), &info) == ReturnCode_t::RETCODE_OK) {
+      if (info.valid_data) call(sample.get());
     }
   }
 
-  void call() {
+  void call(const void* sample) {
+    const std::lock_guard lock(mutex);
+    if (closed) return;
     try {
-      on_sample();
+      on_sample(sample);
     } catch (const std::exception& error) {
       fmt::print(stderr, "{}: a sample was dropped: {}\n", topic->get_name(), error.what());
     }
   }
 
   Participant participant;
-  void* scratch;
-  std::function<void()> on_sample;
+  TypeSupport type;
+  std::function<void(const void*)> on_sample;
   eprosima::fastdds::dds::Topic* topic = nullptr;
   DataReader* reader = nullptr;
 
-  std::mutex mutex;  // guards closed, and scratch while a callback runs
+  std::mutex mutex;  // guards closed; held during a callback, so one runs at a time
   bool closed = false;
 };
 
 ReaderBase::ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos,
-                       TypeSupport type, void* scratch, std::function<void()> on_sample)
-    : impl_(std::make_unique<Impl>(participant, scratch, std::move(on_sample))) {
+                       TypeSupport type, std::function<void(const void*)> on_sample)
+    : impl_(std::make_unique<Impl>(participant, type, std::move(on_sample))) {
   Participant::Core& core = participant.core();
   impl_->topic = core.acquire_topic(topic, type);
   impl_->reader = core.subscriber->create_datareader(impl_->topic, reader_qos(core, qos), impl_.get(),

@@ -21,10 +21,10 @@ namespace jostle::dds {
 /// Everything about a reader that does not depend on its type.
 class ReaderBase {
  public:
-  /// Throws SetupError. `scratch` is a sample of the topic's type that
-  /// `on_sample` may read while it runs.
+  /// `on_sample` gets a sample of the topic's type. Throws SetupError.
   ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos,
-             eprosima::fastdds::dds::TypeSupport type, void* scratch, std::function<void()> on_sample);
+             eprosima::fastdds::dds::TypeSupport type,
+             std::function<void(const void* sample)> on_sample);
   /// Waits for a running callback; none runs afterwards.
   ~ReaderBase();
   ReaderBase(const ReaderBase&) = delete;
@@ -44,21 +44,16 @@ class ReaderBase {
 ///          It must be quick, must not throw, and must not make or destroy
 ///          writers or readers.
 template <class T>
-class Reader {
+class Reader : public ReaderBase {
  public:
   using OnSample = std::function<void(const T&)>;
 
   Reader(const Participant& participant, const Topic<T>& topic, OnSample on_sample)
-      : sample_(std::make_unique<T>()),
-        base_(participant, topic.name, topic.qos,
-              eprosima::fastdds::dds::TypeSupport(new Serializer<T>()), sample_.get(),
-              [sample = sample_.get(), on_sample = std::move(on_sample)] { on_sample(*sample); }) {}
-
-  int matched() const { return base_.matched(); }
-
- private:
-  std::unique_ptr<T> sample_;
-  ReaderBase base_;
+      : ReaderBase(participant, topic.name, topic.qos,
+                   eprosima::fastdds::dds::TypeSupport(new Serializer<T>()),
+                   [on_sample = std::move(on_sample)](const void* sample) {
+                     on_sample(*static_cast<const T*>(sample));
+                   }) {}
 };
 
 /// Keeps samples until somebody takes them. When full the oldest one goes and

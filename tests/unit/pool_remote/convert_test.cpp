@@ -26,7 +26,7 @@ RolloutBatch odd_batch() {
   batch.nominal = {.nu = 4, .values = kAwkward};
   batch.u_before = {1, 2, 3, -0.0};
   batch.step_duration = 0.7;
-  batch.law = {.sigma = {1, 2}, .limit = {3, 4}, .seed = UINT64_MAX - 1, .stream = 17};
+  batch.law = {.sigma = {1, 2}, .limit = {3, 4}, .scales = {5, 6, 7}, .seed = UINT64_MAX - 1, .stream = 17};
   batch.first_sample = UINT32_MAX - 5;
   batch.samples = 5;
   batch.objective = {.goal = 1, .angle = 2, .acceleration = 3, .disturbance = 4,
@@ -55,6 +55,7 @@ TEST(ConvertBatch, SurvivesTheWire) {
   EXPECT_EQ(got.step_duration, wanted.step_duration);
   EXPECT_EQ(got.law.sigma, wanted.law.sigma);
   EXPECT_EQ(got.law.limit, wanted.law.limit);
+  EXPECT_EQ(got.law.scales, wanted.law.scales);
   EXPECT_EQ(got.law.seed, wanted.law.seed);
   EXPECT_EQ(got.law.stream, wanted.law.stream);
   EXPECT_EQ(got.first_sample, wanted.first_sample);

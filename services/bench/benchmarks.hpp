@@ -1,0 +1,47 @@
+#pragma once
+/// \file
+/// Everything that can be measured. docs/benchmarks.md says why.
+
+#include <chrono>
+#include <stop_token>
+#include <vector>
+
+#include "services/bench/measurement.hpp"
+
+namespace jostle::services {
+
+/// How to measure, as the command line says it.
+struct Settings {
+  int repeats = 0;           ///< >= 1
+  std::vector<int> workers;  ///< of `scheduling`: processes, one measurement each
+  int domain = 0;            ///< DDS domain that nobody else uses
+  std::stop_token stop;
+};
+
+using Measurements = std::vector<Measurement>;
+
+/// Longest one run of one side may take: a pool that is slower hangs.
+inline constexpr std::chrono::minutes kPatience{5};
+
+/// ThreadPool against as many bare loops of engine steps, steps/s.
+Result<Measurements> measure_pool_threads(const Settings& settings);
+
+/// RemotePool with two worker processes against two bare loops, steps/s.
+Result<Measurements> measure_pool_dds(const Settings& settings);
+
+/// A batch of one empty sample through RemotePool and one worker against an
+/// echo over bare Fast DDS, microseconds.
+Result<Measurements> measure_round_trip(const Settings& settings);
+
+/// A batch with stop_losers against the same batch without, rollouts/s.
+Result<Measurements> measure_early_stop(const Settings& settings);
+
+/// Worker processes that wait instead of simulating: the time their waiting
+/// takes when nobody idles, against the time the batch took.
+Result<Measurements> measure_scheduling(const Settings& settings);
+
+/// The other process of `round-trip`: answers every task until it is told to
+/// end. Returns the exit code.
+int serve_echo(int domain, std::stop_token stop);
+
+}  // namespace jostle::services

@@ -1,0 +1,97 @@
+// jostle bench: ratios measured inside one run, on this machine.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+
+#include "services/bench/benchmarks.hpp"
+#include "services/support/files.hpp"
+#include "services/support/program.hpp"
+
+namespace jostle::services {
+namespace {
+
+struct Benchmark {
+  const char* name;
+  const char* purpose;
+  int repeats;  // unless the user says
+  Result<Measurements> (*measure)(const Settings&);
+};
+
+constexpr std::array<Benchmark, 5> kBenchmarks{{
+    {"pool-threads", "ThreadPool against bare loops of engine steps", 15, measure_pool_threads},
+    {"pool-dds", "two worker processes against two bare loops", 15, measure_pool_dds},
+    {"round-trip", "an empty task through the pool against a bare Fast DDS echo", 25, measure_round_trip},
+    {"early-stop", "a batch that stops its losers against one that does not", 5, measure_early_stop},
+    {"scheduling", "waiting workers against workers that never idle", 5, measure_scheduling},
+}};
+
+int list() {
+  for (const Benchmark& benchmark : kBenchmarks) fmt::print("{:<14} {}\n", benchmark.name, benchmark.purpose);
+  return kExitOk;
+}
+
+int fail(const Error& error, int code) {
+  fmt::print(stderr, "jostle bench: {}\n", error.message);
+  return error.code == Code::kCancelled ? kExitInterrupted : code;
+}
+
+int perform(const Benchmark& benchmark, Settings settings, const std::string& json) {
+  if (settings.repeats == 0) settings.repeats = benchmark.repeats;
+  auto result = benchmark.measure(settings);
+  if (!result) return fail(result.error(), kExitBroken);
+  for (const Measurement& measurement : *result) fmt::print("{}", to_text(measurement));
+  if (!json.empty()) {
+    if (auto ok = write_text(json, to_json(*result)); !ok) return fail(ok.error(), kExitBroken);
+  }
+  const bool agree = std::ranges::all_of(*result, &Measurement::agrees);
+  return agree ? kExitOk : kExitFailed;
+}
+
+int start(const std::string& name, const Settings& settings, const std::string& json) {
+  if (name == "list") return list();
+  if (name == "echo") return serve_echo(settings.domain, settings.stop);
+  const auto benchmark = std::ranges::find(kBenchmarks, name, [](const Benchmark& b) { return std::string(b.name); });
+  if (benchmark == kBenchmarks.end()) {
+    return fail({Code::kInvalidArgument,
+                 fmt::format("name: got '{}', wanted one that `jostle bench list` shows", name)}, kExitUsage);
+  }
+  return perform(*benchmark, settings, json);
+}
+
+}  // namespace
+}  // namespace jostle::services
+
+int main(int argc, char** argv) {
+  using namespace jostle::services;
+  CLI::App app("Measures the ratio of two ways to do the same work, in turns, on this machine.", "jostle bench");
+  std::string name, json;
+  // Of its own, so that neither a user's system nor another benchmark is in the way.
+  Settings settings{.workers = {64}, .domain = 100 + static_cast<int>(getpid() % 100)};
+  app.add_option("name", name, "A benchmark, or `list`")->required();
+  app.add_option("--repeats", settings.repeats, "Runs of each side (default: the benchmark's)")
+      ->check(CLI::Range(1, 100'000));
+  app.add_option("--json", json, "File for all numbers");
+  app.add_option("--workers", settings.workers, "Of scheduling: worker processes, such as 8,16,64")
+      ->capture_default_str()->delimiter(',')->check(CLI::Range(1, 1024));
+  app.add_option("--domain", settings.domain, "DDS domain (default: one of 100 to 199, from the process id)")
+      ->check(CLI::Range(0, 232));
+  app.footer("Exit codes: 0 measured, 1 the two sides computed different things, 2 bad arguments,\n"
+             "3 a part of the system failed, 130 interrupted. Slowness is no failure.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitOk : kExitUsage;
+  }
+  const StopSignal signal;
+  settings.stop = signal.token();
+  try {
+    return start(name, settings, json);
+  } catch (const std::exception& error) {  // the middleware's SetupError, the engine's errors
+    fmt::print(stderr, "jostle bench: {}\n", error.what());
+    return kExitBroken;
+  }
+}

@@ -1,0 +1,108 @@
+#include "services/bench/measurement.hpp"
+
+#include <fmt/format.h>
+#include <stdlib.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace jostle::services {
+namespace {
+
+double load_average() {
+  double load = 0.0;
+  getloadavg(&load, 1);
+  return load;
+}
+
+std::vector<double> ratios(const Measurement& measurement) {
+  std::vector<double> result;
+  std::ranges::transform(measurement.a, measurement.b, std::back_inserter(result), std::divides());
+  return result;
+}
+
+std::string to_text(const Aim& aim) {
+  return fmt::format("{} {:g}", aim.kind == Aim::Kind::kAtLeast ? ">=" : "<=", aim.ratio);
+}
+
+nlohmann::json to_object(const Measurement& measurement) {
+  const Interval interval = measurement.interval();
+  nlohmann::json samples = nlohmann::json::array();
+  for (std::size_t i = 0; i < measurement.a.size(); ++i) {
+    samples.push_back({measurement.a[i], measurement.b[i]});
+  }
+  nlohmann::json object{{"name", measurement.name},
+                        {"ratio", measurement.ratio()},
+                        {"interval", {interval.low, interval.high}},
+                        {"samples", samples},
+                        {"name_a", measurement.name_a},
+                        {"name_b", measurement.name_b},
+                        {"a", median(measurement.a)},
+                        {"b", median(measurement.b)},
+                        {"unit", measurement.unit},
+                        {"hash_a", to_string(measurement.hash_a)},
+                        {"hash_b", to_string(measurement.hash_b)},
+                        {"agrees", measurement.agrees},
+                        {"load", measurement.load},
+                        {"details", nlohmann::json::object()},
+                        {"aim", nullptr}};
+  for (const auto& [name, value] : measurement.details) object["details"][name] = value;
+  if (measurement.aim) {
+    object["aim"] = to_text(*measurement.aim);
+    object["met"] = measurement.aim->met_by(measurement.ratio());
+  }
+  return object;
+}
+
+}  // namespace
+
+double Measurement::ratio() const { return median(ratios(*this)); }
+
+Interval Measurement::interval() const { return median_interval(ratios(*this)); }
+
+Result<Measurement> compare(const Side& a, const Side& b, int repeats, std::stop_token stop) {
+  Measurement measurement{.name_a = a.name, .name_b = b.name, .load = load_average()};
+  for (int i = -1; i < repeats; ++i) {
+    for (const Side* side : {&a, &b}) {
+      if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
+      auto sample_result = side->run();
+      if (!sample_result) return sample_result.error();
+      Hash& hash = side == &a ? measurement.hash_a : measurement.hash_b;
+      if (i < 0) {
+        hash = sample_result->hash;
+        continue;
+      }
+      if (hash != sample_result->hash) measurement.agrees = false;
+      (side == &a ? measurement.a : measurement.b).push_back(sample_result->value);
+    }
+  }
+  if (measurement.hash_a != measurement.hash_b) measurement.agrees = false;
+  return measurement;
+}
+
+std::string to_text(const Measurement& measurement) {
+  const Interval interval = measurement.interval();
+  const double ratio = measurement.ratio();
+  std::string text = fmt::format("{}: {} against {}\n  ratio {:.3f}  ({:.3f} .. {:.3f}, {} repeats, load {:.1f})",
+                                 measurement.name, measurement.name_a, measurement.name_b, ratio,
+                                 interval.low, interval.high, measurement.a.size(), measurement.load);
+  if (measurement.aim) {
+    text += fmt::format("  aim {}: {}", to_text(*measurement.aim), measurement.aim->met_by(ratio) ? "met" : "missed");
+  }
+  const auto side = [&](const std::string& name, const std::vector<double>& values, const Hash& hash) {
+    text += fmt::format("\n  {:<18} {:>12.5g} {}  {}", name, median(values), measurement.unit, to_string(hash));
+  };
+  side(measurement.name_a, measurement.a, measurement.hash_a);
+  side(measurement.name_b, measurement.b, measurement.hash_b);
+  for (const auto& [name, value] : measurement.details) text += fmt::format("\n  {:<18} {:>12.5g}", name, value);
+  if (!measurement.agrees) text += "\n  WRONG: not every run computed the same";
+  return text + "\n";
+}
+
+std::string to_json(const std::vector<Measurement>& measurements) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Measurement& measurement : measurements) list.push_back(to_object(measurement));
+  return list.dump(2) + "\n";
+}
+
+}  // namespace jostle::services

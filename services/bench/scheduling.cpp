@@ -1,0 +1,78 @@
+#include <fmt/format.h>
+
+#include "services/bench/benchmarks.hpp"
+#include "services/bench/swarm.hpp"
+#include "services/bench/workload.hpp"
+
+namespace jostle::services {
+namespace {
+
+using physics_pool::End;
+using physics_pool::RolloutBatch;
+using physics_pool::RolloutOutcome;
+
+constexpr std::chrono::milliseconds kWait{50};
+constexpr int kTasksPerWorker = 10;
+
+double milliseconds(double seconds) { return 1e3 * seconds; }
+
+Result<Sample> time_waiting(RemotePool& pool, const RolloutBatch& batch, std::stop_token stop) {
+  const auto start = std::chrono::steady_clock::now();
+  auto reply_result = pool.run(batch, start + kPatience, stop);
+  const double seconds = seconds_since(start);
+  if (!reply_result) return reply_result.error();
+  return Sample{.value = milliseconds(seconds), .hash = hash_of_answers(reply_result->outcomes)};
+}
+
+// Nobody idles: every worker waits for its share, back to back.
+Sample waiting_without_gaps(const RolloutBatch& batch, int workers) {
+  std::vector<RolloutOutcome> outcomes;
+  for (std::uint32_t i = 0; i < batch.samples; ++i) {
+    outcomes.push_back({.sample = batch.first_sample + i, .end = End::kCompleted, .cost = 0.0});
+  }
+  const double seconds = std::chrono::duration<double>(*batch.wait).count() * batch.samples / workers;
+  return {.value = milliseconds(seconds), .hash = hash_of_answers(outcomes)};
+}
+
+Result<Measurement> measure_with(int workers, const Settings& settings) {
+  auto scene_result = clutter(5);
+  if (!scene_result) return scene_result.error();
+  RolloutBatch batch = push(*scene_result, 3, 0.5, static_cast<std::uint32_t>(kTasksPerWorker * workers));
+  batch.wait = kWait;
+
+  const auto start = std::chrono::steady_clock::now();
+  auto swarm_result = Swarm::start(workers, settings.domain, settings.stop);
+  if (!swarm_result) return swarm_result.error();
+  const double gathering = seconds_since(start);
+  RemotePool& pool = (*swarm_result)->pool();
+  if (auto loaded = pool.load(*scene_result); !loaded) return loaded.error();
+
+  auto result = compare({"without gaps", [&]() -> Result<Sample> { return waiting_without_gaps(batch, workers); }},
+                        {"pool over DDS", [&] { return time_waiting(pool, batch, settings.stop); }},
+                        settings.repeats, settings.stop);
+  if (!result) return result.error();
+  result->name = fmt::format("scheduling/{}", workers);
+  result->unit = "ms";
+  result->aim = Aim{Aim::Kind::kAtLeast, 0.95};
+  const physics_pool::PoolStatus status = pool.status();
+  result->details = {{"workers", workers},
+                     {"tasks", batch.samples},
+                     {"gathering_s", gathering},
+                     {"reissued", static_cast<double>(status.reissued)},
+                     {"duplicates", static_cast<double>(status.duplicates)}};
+  return result;
+}
+
+}  // namespace
+
+Result<Measurements> measure_scheduling(const Settings& settings) {
+  Measurements measurements;
+  for (const int workers : settings.workers) {
+    auto result = measure_with(workers, settings);
+    if (!result) return result.error();
+    measurements.push_back(*std::move(result));
+  }
+  return measurements;
+}
+
+}  // namespace jostle::services

@@ -1,0 +1,39 @@
+#include "services/bench/statistics.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace jostle::services {
+namespace {
+
+constexpr double kTail = 0.05;  // each side of a 90 % interval
+
+// P(i of n fair coins show heads).
+double binomial(double n, double i) {
+  return std::exp(std::lgamma(n + 1) - std::lgamma(i + 1) - std::lgamma(n - i + 1) - n * std::log(2.0));
+}
+
+}  // namespace
+
+double quantile(std::vector<double> values, double p) {
+  std::ranges::sort(values);
+  const double place = p * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return std::lerp(values[below], values[above], place - static_cast<double>(below));
+}
+
+Interval median_interval(std::vector<double> values) {
+  std::ranges::sort(values);
+  const std::size_t n = values.size();
+  std::size_t outside = 0;  // values left out on each side
+  double tail = binomial(static_cast<double>(n), 0);
+  while (2 * (outside + 1) < n) {
+    tail += binomial(static_cast<double>(n), static_cast<double>(outside + 1));
+    if (tail > kTail) break;
+    ++outside;
+  }
+  return {values[outside], values[n - 1 - outside]};
+}
+
+}  // namespace jostle::services

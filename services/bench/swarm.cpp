@@ -1,0 +1,74 @@
+#include "services/bench/swarm.hpp"
+
+#include <fmt/format.h>
+#include <stdlib.h>
+
+#include "services/support/files.hpp"
+
+namespace jostle::services {
+namespace {
+
+constexpr std::chrono::seconds kGathering{120};  // 64 processes on two busy cores
+constexpr std::chrono::milliseconds kGlance{200};
+
+}  // namespace
+
+Helpers::Helpers(int domain) : domain_(domain) {}
+
+Helpers::~Helpers() {
+  // All at once, then one after the other: ending takes as long as the slowest.
+  for (ChildProcess& child : children_) child.terminate();
+  children_.clear();
+  std::error_code ignored;
+  if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
+}
+
+Result<void> Helpers::start(const std::string& program, std::vector<std::string> arguments) {
+  if (folder_.empty()) {
+    std::string name = (std::filesystem::temp_directory_path() / "jostle-bench-XXXXXX").string();
+    if (!mkdtemp(name.data())) return Error{Code::kIo, fmt::format("{}: cannot be made", name)};
+    folder_ = name;
+  }
+  arguments.insert(arguments.end(), {"--domain", std::to_string(domain_)});
+  auto child_result = ChildProcess::start(program_folder() / program, arguments,
+                                          folder_ / fmt::format("{}.log", children_.size()));
+  if (!child_result) return child_result.error();
+  children_.push_back(std::move(child_result).value());
+  return {};
+}
+
+std::string Helpers::casualty() {
+  for (ChildProcess& child : children_) {
+    if (const auto end = child.ended()) return fmt::format("process {}: {}\n{}", child.pid(), *end, child.last_words());
+  }
+  return "";
+}
+
+Swarm::Swarm(const dds::Participant& participant, int domain)
+    : helpers_(domain), participant_(participant), pool_(participant_) {}
+
+Result<std::unique_ptr<Swarm>> Swarm::start(int workers, int domain, std::stop_token stop) {
+  auto participant_result = dds::Participant::open({.name = "jostle_bench", .domain = domain});
+  if (!participant_result) return participant_result.error();
+  std::unique_ptr<Swarm> swarm(new Swarm(*participant_result, domain));
+  for (int i = 0; i < workers; ++i) {
+    auto ok = swarm->helpers_.start("jostle_worker", {"--name", fmt::format("worker-{}", i), "--die-with-parent"});
+    if (!ok) return ok.error();
+  }
+  if (auto ok = swarm->gather(workers, stop); !ok) return ok.error();
+  return swarm;
+}
+
+Result<void> Swarm::gather(int workers, std::stop_token stop) {
+  const auto deadline = std::chrono::steady_clock::now() + kGathering;
+  while (!pool_.wait_for_workers(workers, std::chrono::steady_clock::now() + kGlance)) {
+    if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
+    const std::string casualty = helpers_.casualty();
+    if (casualty.empty() && std::chrono::steady_clock::now() < deadline) continue;
+    return Error{Code::kUnavailable,
+                 fmt::format("workers: got fewer than {} usable in {} s {}", workers, kGathering.count(), casualty)};
+  }
+  return {};
+}
+
+}  // namespace jostle::services

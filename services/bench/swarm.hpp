@@ -1,0 +1,58 @@
+#pragma once
+/// \file
+/// Worker processes to be measured, and the pool that uses them.
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "services/pool_remote/remote_pool.hpp"
+#include "services/support/child_process.hpp"
+
+namespace jostle::services {
+
+/// Programs that lie beside this one, in one DDS domain with it; all of them end
+/// with it, and so does the folder of their logs.
+class Helpers {
+ public:
+  explicit Helpers(int domain);
+  ~Helpers();
+  Helpers(const Helpers&) = delete;
+  Helpers& operator=(const Helpers&) = delete;
+
+  /// Adds --domain to the arguments.
+  /// Errors   kNotFound naming the program, kIo naming the folder.
+  Result<void> start(const std::string& program, std::vector<std::string> arguments);
+
+  /// One that is gone, with its last words; empty while all are there.
+  std::string casualty();
+
+ private:
+  const int domain_;
+  std::filesystem::path folder_;
+  std::vector<ChildProcess> children_;
+};
+
+/// Workers of one thread each and a client in the same domain.
+class Swarm {
+ public:
+  /// Returns when all workers can be used.
+  /// Errors   kUnavailable  not all of them in time; says how one ended, if it did
+  ///          kCancelled    a stop was requested
+  static Result<std::unique_ptr<Swarm>> start(int workers, int domain, std::stop_token stop);
+
+  RemotePool& pool() { return pool_; }
+  const dds::Participant& participant() const { return participant_; }
+  Helpers& helpers() { return helpers_; }
+
+ private:
+  Swarm(const dds::Participant& participant, int domain);
+  Result<void> gather(int workers, std::stop_token stop);
+
+  Helpers helpers_;  // outlives the pool, which would report their end as a loss
+  dds::Participant participant_;
+  RemotePool pool_;
+};
+
+}  // namespace jostle::services

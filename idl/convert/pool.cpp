@@ -30,6 +30,7 @@ msg::ObjectiveWeights to_wire(const Objective& objective) {
   wire.topple_angle(objective.topple_angle);
   wire.drop(objective.drop);
   wire.drop_height(objective.drop_height);
+  wire.obstruction(objective.obstruction);
   wire.success_cost(objective.success_cost);
   return wire;
 }
@@ -48,6 +49,7 @@ Objective from_wire(const msg::ObjectiveWeights& wire) {
           .topple_angle = wire.topple_angle(),
           .drop = wire.drop(),
           .drop_height = wire.drop_height(),
+          .obstruction = wire.obstruction(),
           .success_cost = wire.success_cost()};
 }
 

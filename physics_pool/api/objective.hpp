@@ -26,6 +26,9 @@ struct Objective {
   double topple_angle = 0.5;    ///< rad; tilt above which an object counts as toppled
   double drop = 20000.0;        ///< per dropped object and step, once it has fallen
   double drop_height = 0.02;    ///< m below its resting height at which an object counts as dropped
+  /// Per other object whose centre is in the hand at the end. What lodges between
+  /// palm and target pushes the target ahead of the hand for ever.
+  double obstruction = 1000.0;
   /// C_thresh of Alg. 1: a rollout succeeds when the target is inside the
   /// pre-grasp region and the cost so far, goal cost included, is at most this.
   double success_cost = 1000.0;

@@ -32,7 +32,8 @@ Result<void> check_weights(const Objective& o) {
       {"disturbance", o.disturbance}, {"disturbance_rotation", o.disturbance_rotation},
       {"edge", o.edge}, {"edge_rate", o.edge_rate}, {"edge_exponent_max", o.edge_exponent_max},
       {"edge_margin", o.edge_margin}, {"topple", o.topple}, {"topple_angle", o.topple_angle},
-      {"drop", o.drop}, {"drop_height", o.drop_height}, {"success_cost", o.success_cost}};
+      {"drop", o.drop}, {"drop_height", o.drop_height},
+      {"obstruction", o.obstruction}, {"success_cost", o.success_cost}};
   for (const auto& [name, value] : weights) {
     if (value >= 0 && std::isfinite(value)) continue;
     return wrong(fmt::format("objective.{}", name), fmt::format("{}", value),

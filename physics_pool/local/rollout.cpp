@@ -67,7 +67,7 @@ RolloutOutcome run_rollout(Simulator& simulator, const RolloutBatch& batch, std:
     outcome.trajectory.push_back(x);
 
     const bool last = t + 1 == steps;
-    const double goal = objective.goal * goal_cost(geometry, x, objective.angle);
+    const double goal = final_cost(geometry, objective, x);
     if (batch.stop_on_success && t >= batch.min_steps && sum + goal <= objective.success_cost &&
         grasped(geometry, x, objective)) {
       sum += goal;

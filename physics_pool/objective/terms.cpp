@@ -8,16 +8,20 @@
 namespace jostle::physics_pool {
 namespace {
 
-// The target's centre in the hand's frame, m.
+// An object's centre in the hand's frame, m.
 struct InHand {
   double forward = 0.0, left = 0.0;
 };
 
-InHand target_in_hand(const TaskGeometry& geometry, const State& x) {
-  const int q = geometry.layout.objects[geometry.layout.target].q;
+InHand in_hand(const ObjectSlot& object, const State& x) {
+  const int q = object.q;
   const double dx = x.q[q] - x.q[kJointX], dy = x.q[q + 1] - x.q[kJointY];
   const double c = std::cos(x.q[kJointRotation]), s = std::sin(x.q[kJointRotation]);
   return {.forward = c * dx + s * dy, .left = -s * dx + c * dy};
+}
+
+InHand target_in_hand(const TaskGeometry& geometry, const State& x) {
+  return in_hand(geometry.layout.objects[static_cast<std::size_t>(geometry.layout.target)], x);
 }
 
 double squared_distance(const double* a, const double* b) {
@@ -58,6 +62,23 @@ TargetBearing target_bearing(const TaskGeometry& geometry, const State& x) {
 double goal_cost(const TaskGeometry& geometry, const State& x, double angle_weight) {
   const TargetBearing bearing = target_bearing(geometry, x);
   return bearing.distance * bearing.distance + angle_weight * bearing.angle * bearing.angle;
+}
+
+int count_obstructions(const TaskGeometry& geometry, const State& x) {
+  int count = 0;
+  for (std::size_t i = 0; i < geometry.layout.objects.size(); ++i) {
+    if (static_cast<int>(i) == geometry.layout.target) continue;
+    const InHand p = in_hand(geometry.layout.objects[i], x);
+    const bool between = p.forward >= 0 && p.forward <= planar_gripper::kFingerLength &&
+                         p.left <= x.q[kJointLeft] && p.left >= -x.q[kJointRight];
+    count += between ? 1 : 0;
+  }
+  return count;
+}
+
+double final_cost(const TaskGeometry& geometry, const Objective& objective, const State& x) {
+  return objective.goal * goal_cost(geometry, x, objective.angle) +
+         objective.obstruction * count_obstructions(geometry, x);
 }
 
 double acceleration_cost(std::span<const double> u_before, std::span<const double> u) {

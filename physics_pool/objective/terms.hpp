@@ -32,6 +32,12 @@ TargetBearing target_bearing(const TaskGeometry& geometry, const State& x);
 /// c_g(x) = d_T^2 + w_phi · phi_T^2
 double goal_cost(const TaskGeometry& geometry, const State& x, double angle_weight);
 
+/// Other objects whose centre lies between the fingers, palm to fingertips.
+int count_obstructions(const TaskGeometry& geometry, const State& x);
+
+/// What a rollout that ends at x pays there: w_g·c_g and the obstructions.
+double final_cost(const TaskGeometry& geometry, const Objective& objective, const State& x);
+
 /// c_a(u_before, u) = |u - u_before|^2
 double acceleration_cost(std::span<const double> u_before, std::span<const double> u);
 

@@ -20,7 +20,7 @@ inline constexpr double kArmWidth = 0.09;
 
 /// Pre-grasp region: where the target's centre counts as inside the hand.
 inline constexpr double kGraspNear = 0.010;     // ahead of the palm's face
-inline constexpr double kGraspFar = 0.065;      // between the pads, which end at 70 mm
+inline constexpr double kGraspFar = kFingerLength;  // between the fingers
 inline constexpr double kGraspSide = 0.030;     // either side of the centre line
 inline constexpr double kGraspDepth = 0.040;    // where straight lines aim to have it
 

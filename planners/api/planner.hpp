@@ -30,7 +30,9 @@ struct Plan {
   ControlSequence controls;  ///< u_0 … u_{n-1}
   Trajectory states;         ///< x_0 … x_n, predicted
   double cost = physics_pool::kInfinity;
-  bool grasped = false;      ///< target predicted in the hand at x_n
+  /// Target predicted in the hand at x_n, at a cost that says nothing failed on
+  /// the way (success_cost).
+  bool grasped = false;
   int iterations = 0;
   std::uint64_t rollouts = 0;
 };

@@ -64,7 +64,7 @@ struct Pbsto::Run {
     best.controls = std::move(controls);
     best.states = outcome.trajectory;
     best.cost = outcome.cost;
-    best.grasped = outcome.grasped;
+    best.grasped = outcome.grasped && outcome.cost <= planner.options_.objective.success_cost;
   }
 
   // Scores a sequence and keeps it if it is better.
@@ -143,7 +143,7 @@ struct Pbsto::Run {
 
   bool done() const {
     return best.iterations >= problem.iterations ||
-           (best.grasped && best.cost <= planner.options_.objective.success_cost);
+           best.grasped;
   }
 };
 

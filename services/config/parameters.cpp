@@ -51,6 +51,7 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("topple_angle", objective.topple_angle);
     in.optional("drop", objective.drop);
     in.optional("drop_height", objective.drop_height);
+    in.optional("obstruction", objective.obstruction);
     in.optional("success_cost", objective.success_cost);
   });
   fields.section("control", false, [&](yaml::Fields& in) {

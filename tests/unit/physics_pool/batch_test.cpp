@@ -118,6 +118,7 @@ const std::vector<Case> kCases{
     {"NegativeToppleAngle", [](B& b) { b.objective.topple_angle = -1; }, "objective.topple_angle", "-1", ">= 0"},
     {"NegativeDrop", [](B& b) { b.objective.drop = -1; }, "objective.drop", "-1", ">= 0"},
     {"NegativeDropHeight", [](B& b) { b.objective.drop_height = -1; }, "objective.drop_height", "-1", ">= 0"},
+    {"NegativeObstruction", [](B& b) { b.objective.obstruction = -1; }, "objective.obstruction", "-1", ">= 0"},
     {"NaNSuccess", [](B& b) { b.objective.success_cost = kNaN; }, "objective.success_cost", "nan", ">= 0"},
 };
 

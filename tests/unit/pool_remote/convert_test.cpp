@@ -32,7 +32,7 @@ RolloutBatch odd_batch() {
   batch.objective = {.goal = 1, .angle = 2, .acceleration = 3, .disturbance = 4,
                      .disturbance_rotation = 5, .edge = 6, .edge_rate = 7, .edge_exponent_max = 8,
                      .edge_margin = 9, .topple = 10, .topple_angle = 11, .drop = 12,
-                     .drop_height = 13, .success_cost = 14};
+                     .drop_height = 13, .obstruction = 15, .success_cost = 14};
   batch.incumbent = 0.1;
   batch.stop_losers = false;
   batch.stop_on_success = true;

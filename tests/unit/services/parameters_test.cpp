@@ -44,7 +44,7 @@ step_duration: 0.5
 min_steps: 4
 planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], update: cost-weighted, lambda: 9, stop_losers: false}
 objective: {goal: 10, angle: 11, acceleration: 12, disturbance: 13, disturbance_rotation: 14, edge: 15, edge_rate: 16,
-            edge_exponent_max: 17, edge_margin: 18, topple: 19, topple_angle: 20, drop: 21, drop_height: 22, success_cost: 23}
+            edge_exponent_max: 17, edge_margin: 18, topple: 19, topple_angle: 20, drop: 21, drop_height: 22, success_cost: 23, obstruction: 24}
 control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, initial_steps: 27, straight_speed: 28,
           timeout: 29.5, close_hand: false}
 )");
@@ -61,8 +61,8 @@ control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, init
   const auto& o = sut.planner.objective;
   EXPECT_THAT((std::vector{o.goal, o.angle, o.acceleration, o.disturbance, o.disturbance_rotation, o.edge,
                            o.edge_rate, o.edge_exponent_max, o.edge_margin, o.topple, o.topple_angle, o.drop,
-                           o.drop_height, o.success_cost}),
-              testing::ElementsAre(10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23));
+                           o.drop_height, o.success_cost, o.obstruction}),
+              testing::ElementsAre(10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24));
   EXPECT_EQ(sut.control.many_iterations, 24);
   EXPECT_EQ(sut.control.few_iterations, 25);
   EXPECT_EQ(sut.control.deviation_threshold, 26);

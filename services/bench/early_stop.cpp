@@ -9,41 +9,76 @@ namespace jostle::services {
 namespace {
 
 using physics_pool::BatchReply;
+using physics_pool::Pool;
 using physics_pool::RolloutBatch;
 using physics_pool::RolloutOutcome;
 
-// Of the plan a batch leaves its caller with: the winner's controls and states.
-Hash hash_of_plan(const RolloutBatch& batch, const BatchReply& reply) {
-  if (reply.winner < 0) return {};
-  const RolloutOutcome& winner = reply.outcomes[static_cast<std::size_t>(reply.winner)];
-  const ControlSequence controls = physics_pool::sample_controls(batch.nominal, batch.law, winner.sample);
-  std::vector<State> plan = winner.trajectory;
-  plan.push_back({.q = controls.values});
-  return hash_of_states(plan);
+// What a plan is so far, and what it costs.
+struct Candidate {
+  ControlSequence controls;
+  Trajectory states;
+  double cost = physics_pool::kInfinity;
+};
+
+// A whole plan's batches in a row: noise around the best so far, whose cost is
+// the one to beat.
+struct Planning {
+  Pool& pool;
+  RolloutBatch first;
+  int iterations = 0;
+  std::stop_token stop;
+
+  struct Outcome {
+    Candidate best;
+    std::uint64_t engine_steps = 0;
+  };
+
+  Result<Outcome> run(bool stop_losers) const {
+    Outcome outcome{.best = {.controls = first.nominal}};
+    for (int i = 0; i < iterations; ++i) {
+      if (auto ok = improve(i, stop_losers, outcome); !ok) return ok.error();
+    }
+    return outcome;
+  }
+
+  // The first iteration scores the nominal controls as they are.
+  Result<void> improve(int iteration, bool stop_losers, Outcome& outcome) const {
+    RolloutBatch batch = first;
+    batch.nominal = outcome.best.controls;
+    batch.incumbent = outcome.best.cost;
+    batch.law.stream = static_cast<std::uint32_t>(iteration);
+    batch.stop_losers = stop_losers;
+    if (iteration == 0) {
+      batch.samples = 1;
+      batch.law.scales = {0.0};
+    }
+    auto reply_result = pool.run(batch, std::chrono::steady_clock::now() + kPatience, stop);
+    if (!reply_result) return reply_result.error();
+    for (const RolloutOutcome& sample : reply_result->outcomes) outcome.engine_steps += sample.engine_steps;
+    if (reply_result->winner < 0) return {};
+    const RolloutOutcome& winner = reply_result->outcomes[static_cast<std::size_t>(reply_result->winner)];
+    outcome.best = {.controls = physics_pool::sample_controls(batch.nominal, batch.law, winner.sample),
+                    .states = winner.trajectory,
+                    .cost = winner.cost};
+    return {};
+  }
+};
+
+Hash hash_of_plan(const Candidate& plan) {
+  std::vector<State> all = plan.states;
+  all.push_back({.q = plan.controls.values, .v = {plan.cost}});
+  return hash_of_states(all);
 }
 
-// The second iteration of a plan: noise around the first one's winner, whose
-// cost is the one to beat.
-Result<RolloutBatch> second_iteration(physics_pool::Pool& pool, RolloutBatch batch, std::stop_token stop) {
-  auto first_result = pool.run(batch, std::chrono::steady_clock::now() + kPatience, stop);
-  if (!first_result) return first_result.error();
-  if (first_result->winner < 0) return Error{Code::kInternal, "early-stop: every rollout diverged"};
-  const RolloutOutcome& winner = first_result->outcomes[static_cast<std::size_t>(first_result->winner)];
-  batch.nominal = physics_pool::sample_controls(batch.nominal, batch.law, winner.sample);
-  batch.incumbent = winner.cost;
-  batch.law.stream = 1;
-  return batch;
-}
-
-// One batch, in rollouts per second; adds the engine steps it took.
-Result<Sample> time_rollouts(physics_pool::Pool& pool, const RolloutBatch& batch, double& steps,
-                             std::stop_token stop) {
+// One whole plan, in rollouts per second; notes the engine steps it took.
+Result<Sample> time_plan(const Planning& planning, bool stop_losers, std::uint64_t& engine_steps) {
   const auto start = std::chrono::steady_clock::now();
-  auto reply_result = pool.run(batch, start + kPatience, stop);
+  auto outcome_result = planning.run(stop_losers);
   const double seconds = seconds_since(start);
-  if (!reply_result) return reply_result.error();
-  for (const RolloutOutcome& outcome : reply_result->outcomes) steps += static_cast<double>(outcome.engine_steps);
-  return Sample{.value = batch.samples / seconds, .hash = hash_of_plan(batch, *reply_result)};
+  if (!outcome_result) return outcome_result.error();
+  engine_steps += outcome_result->engine_steps;
+  const double rollouts = 1.0 + (planning.iterations - 1.0) * planning.first.samples;
+  return Sample{.value = rollouts / seconds, .hash = hash_of_plan(outcome_result->best)};
 }
 
 }  // namespace
@@ -53,22 +88,16 @@ Result<Measurements> measure_early_stop(const Settings& settings) {
   if (!scene_result) return scene_result.error();
   physics_pool::ThreadPool pool(static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u)));
   if (auto loaded = pool.load(*scene_result); !loaded) return loaded.error();
-  auto batch_result = second_iteration(pool, push(*scene_result, 6, 1.0, 8), settings.stop);
-  if (!batch_result) return batch_result.error();
-  const RolloutBatch& patient = *batch_result;
-  RolloutBatch stopping = patient;
-  stopping.stop_losers = true;
+  const Planning planning{.pool = pool, .first = push(*scene_result, 6, 1.0, 8), .iterations = 6, .stop = settings.stop};
 
-  double steps_stopping = 0.0, steps_patient = 0.0;
-  auto result = compare(
-      {"losers stopped", [&] { return time_rollouts(pool, stopping, steps_stopping, settings.stop); }},
-      {"all to the end", [&] { return time_rollouts(pool, patient, steps_patient, settings.stop); }},
-      settings.repeats, settings.stop);
+  std::uint64_t steps_stopping = 0, steps_patient = 0;
+  auto result = compare({"losers stopped", [&] { return time_plan(planning, true, steps_stopping); }},
+                        {"all to the end", [&] { return time_plan(planning, false, steps_patient); }},
+                        {.repeats = settings.repeats, .stop = settings.stop});
   if (!result) return result.error();
   result->name = "early-stop";
   result->unit = "rollouts/s";
-  result->details = {{"steps_saved", 1.0 - steps_stopping / steps_patient},
-                     {"winner_found", result->hash_b.empty() ? 0.0 : 1.0}};
+  result->details = {{"steps_saved", 1.0 - static_cast<double>(steps_stopping) / static_cast<double>(steps_patient)}};
   return Measurements{*std::move(result)};
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <stdlib.h>
+#include <time.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -40,6 +41,8 @@ nlohmann::json to_object(const Measurement& measurement) {
                         {"a", median(measurement.a)},
                         {"b", median(measurement.b)},
                         {"unit", measurement.unit},
+                        {"cpu_a", median(measurement.cpu_a)},
+                        {"cpu_b", median(measurement.cpu_b)},
                         {"hash_a", to_string(measurement.hash_a)},
                         {"hash_b", to_string(measurement.hash_b)},
                         {"agrees", measurement.agrees},
@@ -60,20 +63,29 @@ double Measurement::ratio() const { return median(ratios(*this)); }
 
 Interval Measurement::interval() const { return median_interval(ratios(*this)); }
 
-Result<Measurement> compare(const Side& a, const Side& b, int repeats, std::stop_token stop) {
+double own_cpu_seconds() {
+  timespec used{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+}
+
+Result<Measurement> compare(const Side& a, const Side& b, const Turns& turns) {
   Measurement measurement{.name_a = a.name, .name_b = b.name, .load = load_average()};
-  for (int i = -1; i < repeats; ++i) {
+  for (int i = -1; i < turns.repeats; ++i) {
     for (const Side* side : {&a, &b}) {
-      if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
+      if (turns.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
+      const double cpu_before = turns.cpu_seconds();
       auto sample_result = side->run();
       if (!sample_result) return sample_result.error();
-      Hash& hash = side == &a ? measurement.hash_a : measurement.hash_b;
+      const bool is_a = side == &a;
+      Hash& hash = is_a ? measurement.hash_a : measurement.hash_b;
       if (i < 0) {
         hash = sample_result->hash;
         continue;
       }
       if (hash != sample_result->hash) measurement.agrees = false;
-      (side == &a ? measurement.a : measurement.b).push_back(sample_result->value);
+      (is_a ? measurement.a : measurement.b).push_back(sample_result->value);
+      (is_a ? measurement.cpu_a : measurement.cpu_b).push_back(turns.cpu_seconds() - cpu_before);
     }
   }
   if (measurement.hash_a != measurement.hash_b) measurement.agrees = false;
@@ -89,11 +101,13 @@ std::string to_text(const Measurement& measurement) {
   if (measurement.aim) {
     text += fmt::format("  aim {}: {}", to_text(*measurement.aim), measurement.aim->met_by(ratio) ? "met" : "missed");
   }
-  const auto side = [&](const std::string& name, const std::vector<double>& values, const Hash& hash) {
-    text += fmt::format("\n  {:<18} {:>12.5g} {}  {}", name, median(values), measurement.unit, to_string(hash));
+  const auto side = [&](const std::string& name, const std::vector<double>& values,
+                        const std::vector<double>& cpu, const Hash& hash) {
+    text += fmt::format("\n  {:<18} {:>12.5g} {}  {:.3f} cpu s  {}", name, median(values), measurement.unit,
+                        median(cpu), to_string(hash));
   };
-  side(measurement.name_a, measurement.a, measurement.hash_a);
-  side(measurement.name_b, measurement.b, measurement.hash_b);
+  side(measurement.name_a, measurement.a, measurement.cpu_a, measurement.hash_a);
+  side(measurement.name_b, measurement.b, measurement.cpu_b, measurement.hash_b);
   for (const auto& [name, value] : measurement.details) text += fmt::format("\n  {:<18} {:>12.5g}", name, value);
   if (!measurement.agrees) text += "\n  WRONG: not every run computed the same";
   return text + "\n";

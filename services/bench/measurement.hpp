@@ -40,6 +40,9 @@ struct Measurement {
   std::string name_a, name_b;
   std::string unit;
   std::vector<double> a, b;  ///< [repeats]; a[i] and b[i] were measured one after the other
+  /// [repeats] CPU seconds of each run. Others on the machine hardly change
+  /// them, so their ratio says what a side costs where times say nothing.
+  std::vector<double> cpu_a, cpu_b;
   Hash hash_a, hash_b;
   bool agrees = true;  ///< every run of both sides computed the same
   std::optional<Aim> aim;
@@ -51,9 +54,18 @@ struct Measurement {
   Interval interval() const;
 };
 
+/// CPU seconds that this process has used.
+double own_cpu_seconds();
+
+struct Turns {
+  int repeats = 1;
+  std::stop_token stop;
+  std::function<double()> cpu_seconds = own_cpu_seconds;  ///< used so far by all who take part
+};
+
 /// Runs a, b, a, b, …, each `repeats` times after one run that is not counted.
 /// Errors   a side's, or kCancelled between two runs.
-Result<Measurement> compare(const Side& a, const Side& b, int repeats, std::stop_token stop);
+Result<Measurement> compare(const Side& a, const Side& b, const Turns& turns);
 
 /// For people: a few lines.
 std::string to_text(const Measurement& measurement);

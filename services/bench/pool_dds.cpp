@@ -19,7 +19,7 @@ Result<Measurements> measure_pool_dds(const Settings& settings) {
 
   auto result = compare({"pool over DDS", [&] { return time_steps(pool, batch, settings.stop); }},
                         {"bare loops", [&]() -> Result<Sample> { return loops.run(batch); }},
-                        settings.repeats, settings.stop);
+                        (*swarm_result)->turns(settings.repeats, settings.stop));
   if (!result) return result.error();
   result->name = "pool-dds";
   result->unit = "steps/s";

@@ -20,7 +20,7 @@ Result<Measurements> measure_pool_threads(const Settings& settings) {
 
   auto result = compare({"thread pool", [&] { return time_steps(pool, batch, settings.stop); }},
                         {"bare loops", [&]() -> Result<Sample> { return loops.run(batch); }},
-                        settings.repeats, settings.stop);
+                        Turns{.repeats = settings.repeats, .stop = settings.stop});
   if (!result) return result.error();
   result->name = "pool-threads";
   result->unit = "steps/s";

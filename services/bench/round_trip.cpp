@@ -120,7 +120,7 @@ Result<Measurements> measure_round_trip(const Settings& settings) {
   Trips pool_trips, bare_trips;
   auto result = compare({"pool over DDS", [&] { return through_pool(swarm.pool(), batch, pool_trips); }},
                         {"bare echo", [&] { return bare.echo(task_of(batch), bare_trips); }},
-                        settings.repeats, settings.stop);
+                        swarm.turns(settings.repeats, settings.stop));
   if (!result) return result.error();
   result->name = "round-trip";
   result->unit = "us";

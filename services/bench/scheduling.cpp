@@ -49,7 +49,7 @@ Result<Measurement> measure_with(int workers, const Settings& settings) {
 
   auto result = compare({"without gaps", [&]() -> Result<Sample> { return waiting_without_gaps(batch, workers); }},
                         {"pool over DDS", [&] { return time_waiting(pool, batch, settings.stop); }},
-                        settings.repeats, settings.stop);
+                        (*swarm_result)->turns(settings.repeats, settings.stop));
   if (!result) return result.error();
   result->name = fmt::format("scheduling/{}", workers);
   result->unit = "ms";

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <stdlib.h>
+#include <time.h>
 
 #include "services/support/files.hpp"
 
@@ -44,6 +45,17 @@ std::string Helpers::casualty() {
   return "";
 }
 
+double Helpers::cpu_seconds() const {
+  double sum = own_cpu_seconds();
+  for (const ChildProcess& child : children_) {
+    clockid_t clock{};
+    timespec used{};
+    if (clock_getcpuclockid(child.pid(), &clock) != 0 || clock_gettime(clock, &used) != 0) continue;
+    sum += static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+  }
+  return sum;
+}
+
 Swarm::Swarm(const dds::Participant& participant, int domain)
     : helpers_(domain), participant_(participant), pool_(participant_) {}
 
@@ -63,10 +75,12 @@ Result<void> Swarm::gather(int workers, std::stop_token stop) {
   const auto deadline = std::chrono::steady_clock::now() + kGathering;
   while (!pool_.wait_for_workers(workers, std::chrono::steady_clock::now() + kGlance)) {
     if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
-    const std::string casualty = helpers_.casualty();
-    if (casualty.empty() && std::chrono::steady_clock::now() < deadline) continue;
+    if (const std::string casualty = helpers_.casualty(); !casualty.empty()) {
+      return Error{Code::kUnavailable, fmt::format("a worker ended while {} were gathered: {}", workers, casualty)};
+    }
+    if (std::chrono::steady_clock::now() < deadline) continue;
     return Error{Code::kUnavailable,
-                 fmt::format("workers: got fewer than {} usable in {} s {}", workers, kGathering.count(), casualty)};
+                 fmt::format("workers: got fewer than {} usable in {} s", workers, kGathering.count())};
   }
   return {};
 }

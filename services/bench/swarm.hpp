@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "services/bench/measurement.hpp"
 #include "services/pool_remote/remote_pool.hpp"
 #include "services/support/child_process.hpp"
 
@@ -28,6 +29,9 @@ class Helpers {
   /// One that is gone, with its last words; empty while all are there.
   std::string casualty();
 
+  /// CPU time that this process and the helpers have used.
+  double cpu_seconds() const;
+
  private:
   const int domain_;
   std::filesystem::path folder_;
@@ -45,6 +49,9 @@ class Swarm {
   RemotePool& pool() { return pool_; }
   const dds::Participant& participant() const { return participant_; }
   Helpers& helpers() { return helpers_; }
+  Turns turns(int repeats, std::stop_token stop) const {
+    return {.repeats = repeats, .stop = stop, .cpu_seconds = [this] { return helpers_.cpu_seconds(); }};
+  }
 
  private:
   Swarm(const dds::Participant& participant, int domain);

@@ -80,11 +80,12 @@ Result<void> Session::start_processes() {
   if (!world_result) return world_result.error();
   world_process_ = std::move(world_result).value();
 
-  auto coordinator_result = ChildProcess::start(
-      program("coordinator"),
-      {"--pool", options_.pool, "--threads", std::to_string(options_.workers), "--domain", domain,
-       "--die-with-parent"},
-      folder_ / "coordinator.log");
+  std::vector<std::string> arguments{"--pool", options_.pool, "--domain", domain, "--die-with-parent"};
+  if (options_.pool == "threads") {
+    arguments.insert(arguments.end(), {"--threads", std::to_string(options_.workers)});
+  }
+  auto coordinator_result =
+      ChildProcess::start(program("coordinator"), arguments, folder_ / "coordinator.log");
   if (!coordinator_result) return coordinator_result.error();
   coordinator_process_ = std::move(coordinator_result).value();
 

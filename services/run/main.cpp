@@ -51,7 +51,10 @@ int perform(const RunOptions& options, std::stop_token stop) {
   auto session_result = Session::start(
       options, {.on_feedback = [&](const auto& feedback) { display.show(feedback); },
                 .on_notice = [&](const std::string& text) { display.notice(text); }});
-  if (!session_result) return fail(session_result.error(), kExitBroken);
+  if (!session_result) {
+    return fail(session_result.error(),
+                session_result.error().code == Code::kInvalidArgument ? kExitUsage : kExitBroken);
+  }
   auto result = (*session_result)->perform(stop);
   display.finish();
   if (!result) return fail(result.error(), result.error().code == Code::kCancelled ? kExitInterrupted : kExitBroken);

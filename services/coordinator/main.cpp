@@ -24,7 +24,11 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "Of the pool of threads")->capture_default_str()->check(CLI::Range(1, 1024));
   app.add_option("--domain", participant_options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.add_flag("--die-with-parent", with_parent, "End when the starting process ends");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitOk : kExitUsage;
+  }
   if (with_parent) die_with_parent();
   const StopSignal signal;
   set_up_logging("coordinator");

@@ -60,14 +60,20 @@ void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
                  command.sequence_number(), ++dropped_);
     return;
   }
+  const auto check_result = robot_bridge::check_command(command.velocities(), command.duration());
+  if (!check_result && command.epoch() > epoch_) {  // the present commander must not suffer for it
+    spdlog::warn("command {}/{} of a newcomer: {}; refused", command.epoch(), command.sequence_number(),
+                 check_result.error().message);
+    return;
+  }
   if (command.epoch() > epoch_) {  // a new commander takes over
     epoch_ = command.epoch();
     finished_ = 0;
     actions_.clear();
   }
   accepted_ = command.sequence_number();
-  if (auto ok = robot_bridge::check_command(command.velocities(), command.duration()); !ok) {
-    error_ = fmt::format("command {}: {}", command.sequence_number(), ok.error().message);
+  if (!check_result) {
+    error_ = fmt::format("command {}: {}", command.sequence_number(), check_result.error().message);
     spdlog::warn("{}; refused", error_);
     publish();
     return;
@@ -80,7 +86,7 @@ void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
 }
 
 Result<void> SimulatedWorld::act(const Action& action, std::stop_token stop) {
-  busy_ = true;
+  busy_ = moved_ = true;
   world_.begin(action.u);
   const auto start = steady_clock::now();
   for (long i = 0; i < action.steps; ++i) {
@@ -94,7 +100,6 @@ Result<void> SimulatedWorld::act(const Action& action, std::stop_token stop) {
   }
   busy_ = false;
   finished_ = action.sequence_number;
-  ++measurements_;
   publish();
   return {};
 }
@@ -124,10 +129,9 @@ void SimulatedWorld::publish() {
   const physics_pool::TaskGeometry& geometry = world_.world().geometry();
   const State& truth = world_.state();
   const double time = world_.time();
-  // All publications between two commands are one measurement: reading twice
-  // must not average the noise away.
-  const State seen = physics_pool::observed_state(world_.world().scene(), belief_, truth, options_.level,
-                                                  {.seed = options_.seed, .count = measurements_});
+  const State seen = physics_pool::observed_state(
+      world_.world().scene(), belief_, truth,
+      moved_ ? physics_pool::Measurement::kFeedback : physics_pool::Measurement::kInitial);
   const auto objects = to_message(object_readings(geometry.layout, seen), time);
   objects_.write(objects);
   poses_.write(pose_array_message(objects));

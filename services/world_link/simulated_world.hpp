@@ -31,7 +31,8 @@ struct SimulatedWorldOptions {
 ///
 /// Commands carry the commander's epoch and a sequence number; one from an
 /// older epoch or already done is counted and dropped, a bad one is refused in
-/// `RobotStatus.error`. The robot stands still when no command is at work.
+/// `RobotStatus.error`. A newer epoch takes over with its first good command.
+/// The robot stands still when no command is at work.
 class SimulatedWorld {
  public:
   SimulatedWorld(const dds::Participant& participant, physics_pool::WorldPtr world,
@@ -63,7 +64,7 @@ class SimulatedWorld {
   std::uint64_t finished_ = 0;         // its last finished command
   std::uint64_t accepted_ = 0;         // its last accepted command
   std::uint64_t dropped_ = 0;          // stale commands
-  std::uint32_t measurements_ = 0;     // one per finished command
+  bool moved_ = false;                 // a command was begun
   bool busy_ = false;
   std::string error_;
   std::chrono::steady_clock::time_point next_publication_;

@@ -37,12 +37,29 @@ RobotClient::RobotClient(const dds::Participant& participant, const WorldClientO
 
 Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::stop_token stop) {
   const auto patience = heard_ ? options_.silence : options_.start;
-  auto status = status_.take(steady_clock::now() + patience, stop);
-  if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped on request"};
-  if (!status) return silent("robot", topics::kRobotStatus.name, patience, heard_);
-  heard_ = true;
-  time_ = seconds(status->header());
-  return *std::move(status);
+  const auto deadline = steady_clock::now() + patience;
+  std::string problem;
+  for (;;) {
+    auto status = status_.take(deadline, stop);
+    if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped on request"};
+    if (!status) {
+      if (problem.empty()) return silent("robot", topics::kRobotStatus.name, patience, heard_);
+      return Error{Code::kInvalidArgument, problem + "; no good status followed"};
+    }
+    if (auto reading_result = from_message(*status); !reading_result) {
+      problem = topics::kRobotStatus.name + ": " + reading_result.error().message;
+      spdlog::warn("{}; status {} rejected", problem, ++rejected_);
+      continue;
+    }
+    if (sequence_number_ > 0 && status->epoch() > epoch_) {
+      return Error{Code::kUnavailable,
+                   fmt::format("robot: another commander took over: its epoch is {}, ours {}",
+                               status->epoch(), epoch_)};
+    }
+    heard_ = true;
+    time_ = seconds(status->header());
+    return *std::move(status);
+  }
 }
 
 Result<robot_bridge::RobotReading> RobotClient::read() {
@@ -53,12 +70,7 @@ Result<robot_bridge::RobotReading> RobotClient::read() {
     const bool current = sequence_number_ == 0 || (status_result->epoch() == epoch_ &&
                                                    status_result->sequence_number() == sequence_number_);
     if (!current || status_result->busy()) continue;
-    auto reading_result = from_message(*status_result);
-    if (!reading_result) {
-      return Error{reading_result.error().code,
-                   topics::kRobotStatus.name + ": " + reading_result.error().message};
-    }
-    return reading_result;
+    return from_message(*status_result);
   }
 }
 

@@ -23,6 +23,8 @@ struct WorldClientOptions {
 };
 
 /// Commands go to `rt/robot/command`; `rt/robot/status` tells when one is done.
+/// Bad statuses are counted, reported and skipped; only if nothing good follows
+/// are they an error. So is a commander with a newer epoch, whom the robot obeys.
 class RobotClient final : public robot_bridge::Robot {
  public:
   RobotClient(const dds::Participant& participant, const WorldClientOptions& options = {});
@@ -34,6 +36,7 @@ class RobotClient final : public robot_bridge::Robot {
   double time() const { return time_; }
 
  private:
+  /// The next good one.
   Result<jostle_msgs::msg::RobotStatus> next_status(std::stop_token stop);
 
   WorldClientOptions options_;
@@ -43,6 +46,7 @@ class RobotClient final : public robot_bridge::Robot {
   std::uint64_t sequence_number_ = 0;
   bool heard_ = false;
   double time_ = 0.0;
+  std::uint64_t rejected_ = 0;
 };
 
 /// Object states from `rt/objects/states`, never older than the robot's newest

@@ -15,7 +15,6 @@ namespace {
 
 constexpr std::uint32_t kSceneStream = 0x5ce4e;
 constexpr std::uint32_t kPerturbStream = 0x9e57;
-constexpr std::uint32_t kMeasurementStream = 0x3ea5;
 constexpr int kPlacementTries = 20000;
 
 // Footnote 2 of Ch. 3, low uncertainty.
@@ -156,29 +155,18 @@ Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed) {
 }
 
 State observed_state(const Scene& execution, const Scene& belief, const State& truth,
-                     Uncertainty level, const MeasurementIndex& index) {
-  if (level == Uncertainty::kNone) return truth;
+                     Measurement measurement) {
   State seen = truth;
   const StateLayout layout = layout_of(execution);
+  const State start = initial_state(belief);
   for (std::size_t i = 0; i < layout.objects.size(); ++i) {
-    const auto noise = [&](std::uint32_t axis, double sigma) {
-      return scale_of(level) * sigma *
-             standard_normal(index.seed, {.stream = kMeasurementStream,
-                                          .sample = index.count,
-                                          .step = static_cast<std::uint32_t>(i),
-                                          .axis = axis});
-    };
-    double* p = &seen.q[static_cast<std::size_t>(layout.objects[i].q)];
-    p[0] += noise(0, kPositionSigma);
-    p[1] += noise(1, kPositionSigma);
-    p[2] += belief.objects[i].rest_height() - execution.objects[i].rest_height();
-    // q_seen = yaw(noise) * q_true
-    const double half = noise(2, kYawSigma) / 2, c = std::cos(half), s = std::sin(half);
-    const std::array<double, 4> q{p[3], p[4], p[5], p[6]};
-    p[3] = c * q[0] - s * q[3];
-    p[4] = c * q[1] - s * q[2];
-    p[5] = c * q[2] + s * q[1];
-    p[6] = c * q[3] + s * q[0];
+    const int q = layout.objects[i].q;
+    if (measurement == Measurement::kInitial) {
+      std::copy_n(start.q.begin() + q, 7, seen.q.begin() + q);
+    } else {
+      seen.q[static_cast<std::size_t>(q) + 2] +=
+          belief.objects[i].rest_height() - execution.objects[i].rest_height();
+    }
   }
   return seen;
 }

@@ -43,20 +43,19 @@ double velocity_noise(Uncertainty level);
 /// thesis calls variances are standard deviations here. Believed objects never
 /// overlap: a draw that would is made again, with less noise after each try, and
 /// if that does not help, everything is.
-/// What is measured during a run gets noise of its own, see observed_state.
 Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed);
 
-/// Which measurement of which run: equal indices give equal noise.
-struct MeasurementIndex {
-  std::uint64_t seed = 0;
-  std::uint32_t count = 0;  ///< measurements made before this one
+/// What a measurement follows.
+enum class Measurement {
+  kInitial,   ///< nothing has moved: objects are where the planning world has them
+  kFeedback,  ///< an action: poses are exact, shapes remain believed
 };
 
-/// The state of the execution world as the planner's instruments show it: fresh
-/// Gaussian noise on every object's x, y and yaw (the pose noise of footnote 2
-/// at this level), and every object as high above the surface as its believed
-/// shape puts it. The robot's joints are exact.
+/// The state of the execution world as the planner sees it. The thesis adds
+/// pose noise when a planning world is made and then observes; its experiments
+/// with noisy tracking are separate ones (Sec. 3.3.3). Every object is as high
+/// above the surface as its believed shape puts it; joints are exact.
 State observed_state(const Scene& execution, const Scene& belief, const State& truth,
-                     Uncertainty level, const MeasurementIndex& index);
+                     Measurement measurement);
 
 }  // namespace jostle::physics_pool

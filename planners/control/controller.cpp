@@ -84,8 +84,7 @@ class Run {
     ++outcome_.replans;
     if (auto ok = plan(controls, replan_iterations_); !ok) return ok;
     replan_iterations_ = plan_.grasped ? options_.few_iterations
-                                       : std::min(replan_iterations_ * std::max(options_.few_growth, 1),
-                                                  options_.many_iterations);
+                                       : std::min(2 * replan_iterations_, options_.few_iterations_max);
     return {};
   }
 

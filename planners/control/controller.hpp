@@ -26,10 +26,10 @@ struct ControlOptions {
   Method method = Method::kOnline;
   int many_iterations = 50;  ///< ManyIter
   int few_iterations = 1;    ///< FewIter
-  /// FewIter is multiplied by this after every re-plan in a row that does not
-  /// reach the target, up to ManyIter: brief while it suffices, thorough once
-  /// the hand is stuck. 1 is Alg. 2 to the letter.
-  int few_growth = 2;
+  /// FewIter doubles after every re-plan in a row that does not reach the
+  /// target, up to this: brief while it suffices, thorough once the hand is
+  /// stuck. Equal to few_iterations it is Alg. 2 to the letter.
+  int few_iterations_max = 8;
   int min_steps = 2;         ///< n_min
   /// SD_thresh: largest |x_predicted - x_observed|, over robot joints (m, rad)
   /// and objects (m, and rad of rotation).

@@ -57,7 +57,7 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
   fields.section("control", false, [&](yaml::Fields& in) {
     in.optional("many_iterations", control.many_iterations);
     in.optional("few_iterations", control.few_iterations);
-    in.optional("few_growth", control.few_growth);
+    in.optional("few_iterations_max", control.few_iterations_max);
     in.optional("deviation_threshold", control.deviation_threshold);
     in.optional("initial_steps", control.initial_steps);
     in.optional("straight_speed", control.straight_speed);
@@ -86,7 +86,7 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
                              Range{"step_duration", planner.step_duration, 1e-3, physics_pool::kMaxStepDuration},
                              Range{"control.many_iterations", double(control.many_iterations), 0, 1e6},
                              Range{"control.few_iterations", double(control.few_iterations), 0, 1e6},
-                             Range{"control.few_growth", double(control.few_growth), 1, 1000},
+                             Range{"control.few_iterations_max", double(control.few_iterations_max), 0, 1e6},
                              Range{"control.deviation_threshold", control.deviation_threshold, 0, 1e6},
                              Range{"control.initial_steps", double(control.initial_steps), 1, physics_pool::kMaxSteps},
                              Range{"control.straight_speed", control.straight_speed, 0, 1},

@@ -11,11 +11,11 @@
 #include "services/doctor/machine.hpp"
 #include "services/doctor/network.hpp"
 #include "services/doctor/shared_memory.hpp"
+#include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
 
-constexpr int kFailed = 1, kUsage = 2;
 
 std::vector<Check> examine() {
   std::vector<Check> checks{check_shared_memory(), check_leftovers()};
@@ -66,11 +66,11 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kUsage;
+    return app.exit(error) == 0 ? 0 : kExitUsage;
   }
   if (clean) remove_leftovers(find_leftovers());
   const std::vector<Check> checks = examine();
   as_json ? print_json(checks) : print_lines(checks);
   const bool failed = std::ranges::any_of(checks, [](const Check& check) { return check.verdict == Verdict::kFail; });
-  return failed ? kFailed : 0;
+  return failed ? kExitFailed : 0;
 }

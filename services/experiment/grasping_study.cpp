@@ -65,7 +65,7 @@ Result<planners::Outcome> grasp(const GraspingStudy& study, const GraspingRun& r
   if (!hash_result) return hash_result.error();
   physics_pool::ExecutionWorld world(*truth_result, physics_pool::velocity_noise(level), run.seed);
   SimulatedRobot robot(world);
-  SimulatedObjects objects(world, belief, level, run.seed);
+  SimulatedObjects objects(world, belief);
   planners::Pbsto planner(pool, study.parameters.planner);
   planners::ControlSetup setup{.planner = planner,
                                .robot = robot,

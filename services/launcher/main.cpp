@@ -11,11 +11,11 @@
 
 #include "services/launcher/programs.hpp"
 #include "services/support/files.hpp"
+#include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
 
-constexpr int kFailed = 1, kUsage = 2;
 
 int show_help(const std::filesystem::path& folder) {
   fmt::print("Plans and executes physics-based manipulation, on as many machines as there are.\n\n"
@@ -34,7 +34,7 @@ int complain(const std::filesystem::path& folder, const std::string& name) {
   fmt::print(stderr, "jostle: no program '{}' in {}; {}\n", name, folder.string(),
              meant.empty() ? "`jostle help` lists what there is"
                            : fmt::format("did you mean `jostle {}`?", meant));
-  return kUsage;
+  return kExitUsage;
 }
 
 // Becomes the program; returns only if that failed.
@@ -48,14 +48,14 @@ int become(const std::filesystem::path& folder, const std::string& name, std::ve
   arguments.push_back(nullptr);
   execv(file.c_str(), arguments.data());
   fmt::print(stderr, "jostle: {} cannot be run: {}\n", file, std::strerror(errno));
-  return kFailed;
+  return kExitFailed;
 }
 
 int launch(const std::vector<char*>& arguments) {
   const std::filesystem::path folder = program_folder();
   if (arguments.empty()) {
     show_help(folder);
-    return kUsage;
+    return kExitUsage;
   }
   const std::string name = arguments[0];
   if (name == "--version") {

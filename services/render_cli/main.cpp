@@ -8,11 +8,11 @@
 #include "physics_pool/render/montage.hpp"
 #include "physics_pool/render/renderer.hpp"
 #include "services/render_cli/frames.hpp"
+#include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
 
-constexpr int kFailed = 1, kUsage = 2;
 
 struct Arguments {
   std::filesystem::path input, output;
@@ -73,15 +73,15 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kUsage;
+    return app.exit(error) == 0 ? 0 : kExitUsage;
   }
   if (!parse_size(arguments.size, arguments.options)) {
     fmt::print(stderr, "jostle render: --size: got '{}', wanted WxH such as 640x480\n", arguments.size);
-    return kUsage;
+    return kExitUsage;
   }
   if (auto ok = run(arguments); !ok) {
     fmt::print(stderr, "jostle render: {}\n", ok.error().message);
-    return kFailed;
+    return kExitFailed;
   }
   return 0;
 }

@@ -8,6 +8,7 @@
 #include "physics_pool/scene/generate.hpp"
 #include "physics_pool/scene/scene.hpp"
 #include "services/support/files.hpp"
+#include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
@@ -15,7 +16,6 @@ namespace {
 using physics_pool::Scene;
 using physics_pool::SceneObject;
 
-constexpr int kFailed = 1, kUsage = 2;
 const std::string kStandardOutput = "-";
 
 struct Arguments {
@@ -135,11 +135,11 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kUsage;
+    return app.exit(error) == 0 ? 0 : kExitUsage;
   }
   if (auto ok = chosen(arguments); !ok) {
     fmt::print(stderr, "jostle scene: {}\n", ok.error().message);
-    return kFailed;
+    return kExitFailed;
   }
   return 0;
 }

@@ -42,9 +42,9 @@ Result<void> SimulatedRobot::execute(std::span<const double> u, double duration,
 }
 
 Result<std::vector<perception::ObjectReading>> SimulatedObjects::read() {
-  const State seen = physics_pool::observed_state(world_.world().scene(), belief_, world_.state(),
-                                                  level_, index_);
-  ++index_.count;
+  const State seen =
+      physics_pool::observed_state(world_.world().scene(), belief_, world_.state(), next_);
+  next_ = physics_pool::Measurement::kFeedback;
   return object_readings(world_.world().geometry().layout, seen);
 }
 

@@ -26,21 +26,20 @@ class SimulatedRobot final : public robot_bridge::Robot {
   physics_pool::ExecutionWorld& world_;
 };
 
-/// Sees the objects of an execution world as observed_state does; a measurement
-/// per reading.
+/// Sees the objects of an execution world as observed_state does. The first
+/// reading is the initial measurement.
 class SimulatedObjects final : public perception::ObjectSource {
  public:
-  SimulatedObjects(const physics_pool::ExecutionWorld& world, physics_pool::Scene belief,
-                   physics_pool::Uncertainty level, std::uint64_t seed)
-      : world_(world), belief_(std::move(belief)), level_(level), index_{.seed = seed} {}
+  /// `belief`: the planning scene.
+  SimulatedObjects(const physics_pool::ExecutionWorld& world, physics_pool::Scene belief)
+      : world_(world), belief_(std::move(belief)) {}
 
   Result<std::vector<perception::ObjectReading>> read() override;
 
  private:
   const physics_pool::ExecutionWorld& world_;
   physics_pool::Scene belief_;
-  physics_pool::Uncertainty level_;
-  physics_pool::MeasurementIndex index_;
+  physics_pool::Measurement next_ = physics_pool::Measurement::kInitial;
 };
 
 }  // namespace jostle::services

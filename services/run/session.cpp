@@ -135,6 +135,8 @@ Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
 void Session::listen() {
   for (const auto& feedback : feedback_.take_all()) {
     coordinator_heard_ = Clock::now();
+    // Ours is idle until it gets our goal; it may be the last one we hear of.
+    if (!sent_ && !feedback.goal_id().empty()) others_heard_ = true;
     if (sent_ && feedback.goal_id() == goal_id_ && watcher_.on_feedback) watcher_.on_feedback(feedback);
   }
   if (!world_.take_all().empty()) world_heard_ = Clock::now();
@@ -142,6 +144,11 @@ void Session::listen() {
 
 // The goal goes out once everybody who has a part in it was heard.
 Result<void> Session::send_goal() {
+  if (others_heard_ || goal_.matched() > 1) {
+    return Error{Code::kUnavailable,
+                 fmt::format("domain {}: got another coordinator beside ours, wanted none; another run uses "
+                             "this domain, set ROS_DOMAIN_ID to a free one", participant_.domain())};
+  }
   if (!coordinator_heard_ || !world_heard_ || goal_.matched() == 0 || results_.matched() == 0) {
     if (Clock::now() < goal_deadline_) return {};
     return Error{Code::kUnavailable,
@@ -149,11 +156,6 @@ Result<void> Session::send_goal() {
                              "shared memory and multicast",
                              coordinator_heard_ ? "the simulated world was" : "the coordinator was",
                              kStart.count(), participant_.domain())};
-  }
-  if (goal_.matched() > 1) {
-    return Error{Code::kUnavailable,
-                 fmt::format("domain {}: {} coordinators, wanted one; another run uses this domain, set "
-                             "ROS_DOMAIN_ID to a free one", participant_.domain(), goal_.matched())};
   }
   jostle_msgs::msg::Goal goal;
   goal.goal_id(goal_id_);

@@ -63,7 +63,8 @@ class Session {
   dds::Participant participant_;
   std::filesystem::path folder_;  // for logs and the scene; removed at the end
   std::string goal_id_;
-  bool sent_ = false;
+  bool sent_ = false;          // the goal
+  bool others_heard_ = false;  // a coordinator that works for somebody else
   int workers_started_ = 0;
   Clock::time_point goal_deadline_;
   std::optional<Clock::time_point> coordinator_heard_, world_heard_;

@@ -1,0 +1,177 @@
+// Bad files, bad arguments and bad messages, given to a run.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "services/dds/reader.hpp"
+#include "services/dds/topics.hpp"
+#include "tests/support/run_fixture.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+class BadInput : public RunFixture {
+ protected:
+  // The run refuses, without starting anything, in words that hold all of these.
+  void expect_refused(const std::vector<std::string>& arguments, const std::vector<std::string>& words) {
+    SCOPED_TRACE(::testing::PrintToString(arguments));
+    EXPECT_EQ(finish(arguments), 2);
+    for (const std::string& word : words) EXPECT_THAT(run->err(), HasSubstr(word));
+    EXPECT_THAT(run_folders(), IsEmpty());
+  }
+
+  std::string scene_file(const std::function<void(physics_pool::Scene&)>& spoil) {
+    physics_pool::Scene scene = three_objects();
+    spoil(scene);
+    return folder.write("spoilt.yaml", physics_pool::to_yaml(scene));
+  }
+};
+
+TEST_F(BadInput, SceneThatIsNoneIsRefusedWithFileFieldGotAndWanted) {
+  const std::string missing = folder.path() / "missing.yaml";
+  expect_refused({missing}, {missing});
+  const std::string broken = folder.write("broken.yaml", "jostle_scene: [1, 2\n");
+  expect_refused({broken}, {broken + ":", "YAML"});
+  const std::string other = folder.write("other.yaml", "fruit: apple\n");
+  expect_refused({other}, {other + ":", "wanted"});
+  const std::string empty = folder.write("empty.yaml", "");
+  expect_refused({empty}, {empty, "wanted"});
+}
+
+TEST_F(BadInput, SceneThatCannotBeIsRefusedWithFileFieldGotAndWanted) {
+  const std::string spoilt = folder.path() / "spoilt.yaml";
+  using physics_pool::Scene;
+  expect_refused({scene_file([](Scene& s) { s.objects[1].x = s.objects[0].x; s.objects[1].y = s.objects[0].y; })},
+                 {spoilt, "objects[1]", "target", "can"});
+  expect_refused({scene_file([](Scene& s) { s.robot.model = "shoggoth"; })},
+                 {spoilt, "robot.model", "got 'shoggoth'", "wanted"});
+  expect_refused({scene_file([](Scene& s) { s.objects[2].mass = -0.5; })},
+                 {spoilt, "objects[2]", "mass", "got -0.5", "wanted"});
+  expect_refused({scene_file([](Scene& s) { s.objects[2].x = kNaN; })}, {spoilt, "objects[2]", "got", "wanted"});
+  expect_refused({scene_file([](Scene& s) { s.task.target = "grail"; })},
+                 {spoilt, "task.target", "got 'grail'", "wanted"});
+  expect_refused({scene_file([](Scene& s) { s.objects[2].name = "can"; })}, {spoilt, "objects[2]", "'can'"});
+}
+
+TEST_F(BadInput, ArgumentsAreRefusedWithGotAndWanted) {
+  expect_refused({easy, "--controller", "psychic"}, {"controller", "psychic", "or", "nr"});
+  expect_refused({easy, "--uncertainty", "total"}, {"uncertainty", "total", "none, low, medium or high"});
+  expect_refused({easy, "--pool", "swimming"}, {"pool", "swimming", "dds", "threads"});
+  expect_refused({easy, "--workers", "-1"}, {"workers", "-1"});
+  expect_refused({easy, "--workers", "0", "--pool", "threads"}, {"--workers", "got 0", "wanted"});
+  expect_refused({easy, "--rate", "-1"}, {"rate", "-1"});
+  expect_refused({easy, "--parameters", plain, "--domain", "999"}, {"999", "wanted"});
+  expect_refused({}, {"scene"});
+}
+
+TEST_F(BadInput, ParametersAreRefusedWithFileFieldGotAndWanted) {
+  const auto parameters = [&](const std::string& text) { return folder.write("bad.yaml", text).string(); };
+  const std::string bad = folder.path() / "bad.yaml";
+  expect_refused({easy, "--parameters", folder.path() / "missing.yaml"}, {"missing.yaml"});
+  expect_refused({easy, "--parameters", parameters("planner: {rollouts: 0}\n")},
+                 {bad, "planner.rollouts", "got 0", "wanted"});
+  expect_refused({easy, "--parameters", parameters("planner: {rollouts: many}\n")},
+                 {bad, "planner.rollouts", "got 'many'", "wanted"});
+  expect_refused({easy, "--parameters", parameters("step_duration: .nan\n")},
+                 {bad, "step_duration", "got nan", "wanted"});
+  expect_refused({easy, "--parameters", parameters("planer: {rollouts: 8}\n")}, {bad, "planer", "wanted"});
+  expect_refused({easy, "--parameters", parameters("planner: [\n")}, {bad, "YAML"});
+}
+
+// A stranger on the domain of a run that acts.
+class Stranger : public RunFixture {
+ protected:
+  void SetUp() override { ASSERT_NO_FATAL_FAILURE(start_acting()); }
+
+  // What the world says of itself now, or nothing.
+  std::optional<jostle_msgs::msg::RobotStatus> status() {
+    return statuses.take(std::chrono::steady_clock::now() + kPatience);
+  }
+
+  template <class Message>
+  void send(const dds::Topic<Message>& topic, int readers, const Message& message) {
+    auto& writer = *std::static_pointer_cast<dds::Writer<Message>>(
+        writers.emplace_back(std::make_shared<dds::Writer<Message>>(participant, topic)));
+    ASSERT_TRUE(writer.wait_for_readers(std::chrono::steady_clock::now() + kPatience, readers));
+    ASSERT_TRUE(writer.write(message));
+  }
+
+  // The run grasps the target, and before that `program`'s log names the problem.
+  void expect_named_and_survived(const std::string& log_name, const std::string& problem) {
+    std::string words;
+    soon(kPatience, [&] {
+      const std::string now = log(log_name);
+      if (!now.empty()) words = now;
+      return words.find(problem) != std::string::npos || run->code();
+    });
+    EXPECT_THAT(words, HasSubstr(problem));
+    EXPECT_EQ(run->wait(kPatience), 0) << run->err();
+  }
+
+  const dds::Participant participant = dds::Participant::open({.domain = domain}).value();
+  dds::Inbox<jostle_msgs::msg::RobotStatus> statuses{participant, topics::kRobotStatus, 1};
+  std::vector<std::shared_ptr<dds::WriterBase>> writers;
+};
+
+TEST_F(Stranger, ObjectWithoutAPositionIsRejectedByName) {
+  jostle_msgs::msg::ObjectStates objects;
+  objects.objects().resize(2);
+  objects.objects()[0].name("target");
+  objects.objects()[0].pose().orientation().w(1.0);
+  objects.objects()[1].name("can");
+  objects.objects()[1].pose().position().x(kNaN);
+
+  send(topics::kObjectStates, 1, objects);
+
+  expect_named_and_survived("coordinator.log", "rt/objects/states: objects[1] ('can').pose.position.x: got nan");
+}
+
+TEST_F(Stranger, RobotWithoutAPositionIsRejectedByName) {
+  auto spoilt = status();
+  ASSERT_TRUE(spoilt);
+  spoilt->q().at(2) = -kNaN;
+  spoilt->busy(false);
+
+  send(topics::kRobotStatus, 3, *spoilt);  // run, coordinator, this test
+
+  expect_named_and_survived("coordinator.log", "rt/robot/status: q[2]: got ");
+}
+
+TEST_F(Stranger, CommandThatIsNoneTakesTheRobotFromNobody) {
+  const auto now = status();
+  ASSERT_TRUE(now);
+  jostle_msgs::msg::VelocityCommand command;
+  command.epoch(now->epoch() + 1'000'000'000);
+  command.sequence_number(1);
+  command.velocities({0.0, kNaN, 0.0, 0.0});
+  command.duration(1.0);
+
+  send(topics::kRobotCommand, 1, command);
+
+  expect_named_and_survived("sim.log", "velocities[1]: got nan");
+}
+
+TEST_F(Stranger, NewCommanderEndsTheRunInPlainWords) {
+  const auto now = status();
+  ASSERT_TRUE(now);
+  jostle_msgs::msg::VelocityCommand command;
+  command.epoch(now->epoch() + 1'000'000'000);
+  command.sequence_number(1);
+  command.velocities({0.0, 0.0, 0.0, 0.0});
+  command.duration(0.1);
+
+  send(topics::kRobotCommand, 1, command);
+
+  EXPECT_EQ(run->wait(20s), 3);
+  EXPECT_THAT(run->err(), HasSubstr("robot: another commander took over"));
+}
+
+}  // namespace
+}  // namespace jostle::tests

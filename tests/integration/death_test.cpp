@@ -1,0 +1,163 @@
+// Parts of a run that die or stall, and what the rest makes of it.
+
+#include <gmock/gmock.h>
+
+#include "services/dds/topics.hpp"
+#include "services/dds/writer.hpp"
+#include "tests/support/run_fixture.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// Wanted are 2 s; a machine with other work gets half as much again.
+constexpr auto kReport = 3s;
+
+struct Death {
+  const char* program;
+  int signal;
+  bool acting;  // else planning
+  const char* blamed;
+};
+
+class Deaths : public RunFixture {
+ protected:
+  // Signals a child and gives the run's exit code; measures how long it took.
+  int code_after(pid_t victim, int signal, std::chrono::milliseconds patience) {
+    run->children();  // whoever must be gone at the end
+    const auto start = Clock::now();
+    kill(victim, signal);
+    const auto code = run->wait(patience);
+    took = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - start);
+    return code.value_or(-1);
+  }
+
+  std::chrono::milliseconds took{};
+};
+
+class PartOfARun : public Deaths, public ::testing::WithParamInterface<Death> {};
+
+TEST_P(PartOfARun, EndsTheRunWithItsNameWhenItIsGone) {
+  ASSERT_NO_FATAL_FAILURE(GetParam().acting ? start_acting() : start_planning());
+  const pid_t victim = run->child(GetParam().program);
+  ASSERT_GT(victim, 0);
+
+  EXPECT_EQ(code_after(victim, GetParam().signal, 20s), 3);
+
+  fmt::print("reported after {} ms: {}\n", took.count(), run->err().substr(run->err().find("jostle run:")));
+  EXPECT_LT(took, kReport);
+  // The coordinator may be the first to miss the world: it knows it as robot.
+  EXPECT_THAT(run->err(), HasSubstr("jostle run: "));
+  EXPECT_THAT(run->err(), AnyOf(HasSubstr(GetParam().blamed),
+                                HasSubstr(std::string(GetParam().program) == "jostle_sim" ? "robot: nothing heard"
+                                                                                          : GetParam().blamed)));
+  EXPECT_THAT(run->left_over(), IsEmpty());
+  EXPECT_THAT(run_folders(), IsEmpty());
+}
+
+constexpr const char* kSim = "jostle_sim";
+constexpr const char* kCoordinator = "jostle_coordinator";
+
+INSTANTIATE_TEST_SUITE_P(
+    , PartOfARun,
+    ::testing::Values(Death{kSim, SIGKILL, false, "the simulated world ended: killed by signal 9"},
+                      Death{kSim, SIGKILL, true, "the simulated world ended: killed by signal 9"},
+                      Death{kSim, SIGSTOP, false, "the simulated world runs but was not heard"},
+                      Death{kSim, SIGSTOP, true, "the simulated world runs but was not heard"},
+                      Death{kCoordinator, SIGKILL, false, "the coordinator ended: killed by signal 9"},
+                      Death{kCoordinator, SIGKILL, true, "the coordinator ended: killed by signal 9"},
+                      Death{kCoordinator, SIGSTOP, false, "the coordinator runs but was not heard"},
+                      Death{kCoordinator, SIGSTOP, true, "the coordinator runs but was not heard"}),
+    [](const auto& death) {
+      return fmt::format("{}{}While{}", death.param.program + std::string("jostle_").size(),
+                         death.param.signal == SIGKILL ? "Killed" : "Stalled",
+                         death.param.acting ? "Acting" : "Planning");
+    });
+
+class WorkerOfARun : public Deaths, public ::testing::WithParamInterface<int> {};
+
+TEST_P(WorkerOfARun, IsNotMissedWhenItIsGone) {
+  // One plan with work enough that the victim's part of it is missed, and no other.
+  const std::string thorough = folder.write(
+      "thorough.yaml", "objective: {success_cost: 1.0e-9}\n"
+                       "control: {many_iterations: 6, few_iterations: 0}\n");
+  start({easy, "--workers", "2", "--parameters", thorough});
+  ASSERT_TRUE(run->says("planning  iteration  1", kPatience)) << run->err();
+  const pid_t victim = run->child("jostle_worker");
+  ASSERT_GT(victim, 0);
+
+  EXPECT_EQ(code_after(victim, GetParam(), kPatience), 0) << run->err();
+
+  EXPECT_THAT(run->out(), HasSubstr("SUCCESS"));
+  EXPECT_THAT(run->left_over(), IsEmpty());
+}
+
+INSTANTIATE_TEST_SUITE_P(, WorkerOfARun, ::testing::Values(SIGKILL, SIGSTOP),
+                         [](const auto& death) { return death.param == SIGKILL ? "Killed" : "Stalled"; });
+
+TEST_F(Deaths, RunThatIsKilledTakesItsChildrenAlong) {
+  ASSERT_NO_FATAL_FAILURE(start_planning());
+  ASSERT_EQ(run->children().size(), 4u);  // world, coordinator, two workers
+
+  const auto start = Clock::now();
+  run->signal(SIGKILL);
+
+  EXPECT_TRUE(soon(kReport, [&] { return run->left_over().empty(); }))
+      << ::testing::PrintToString(run->left_over());
+  fmt::print("children gone after {:.2f} s\n", std::chrono::duration<double>(Clock::now() - start).count());
+}
+
+TEST_F(Deaths, InterruptedRunCleansUpWhilePlanning) {
+  ASSERT_NO_FATAL_FAILURE(start_planning());
+  ASSERT_EQ(run_folders().size(), 1u);
+
+  EXPECT_EQ(code_after(run->pid(), SIGINT, 20s), 130) << run->err();
+
+  fmt::print("ended after {} ms\n", took.count());
+  EXPECT_LT(took, kReport);
+  EXPECT_THAT(run->left_over(), IsEmpty());
+  EXPECT_THAT(run_folders(), IsEmpty());
+}
+
+TEST_F(Deaths, InterruptedRunCleansUpWhileActing) {
+  ASSERT_NO_FATAL_FAILURE(start_acting());
+
+  EXPECT_EQ(code_after(run->pid(), SIGINT, 20s), 130) << run->err();
+
+  fmt::print("ended after {} ms\n", took.count());
+  EXPECT_LT(took, kReport);
+  EXPECT_THAT(run->left_over(), IsEmpty());
+  EXPECT_THAT(run_folders(), IsEmpty());
+}
+
+TEST_F(Deaths, SecondRunOnADomainIsToldSoAndTheFirstGoesOn) {
+  ASSERT_NO_FATAL_FAILURE(start_acting());
+
+  const auto second = program("jostle_run", {easy, "--parameters", plain, "--headless", "--workers", "1"});
+
+  EXPECT_EQ(second->wait(kPatience), 3);
+  EXPECT_THAT(second->err(), HasSubstr("ROS_DOMAIN_ID"));
+  EXPECT_EQ(run->wait(kPatience), 0) << run->err();
+}
+
+// Another run's coordinator may be heard before our own has started.
+TEST_F(Deaths, RunThatHearsOfAnothersTaskSaysThatTheDomainIsTaken) {
+  const auto participant = dds::Participant::open({.domain = domain}).value();
+  dds::Writer<jostle_msgs::msg::Feedback> other(participant, topics::kTaskFeedback);
+  jostle_msgs::msg::Feedback feedback;
+  feedback.goal_id("another run's");
+
+  start({easy, "--parameters", plain, "--workers", "1", "--plan-only"});
+
+  EXPECT_TRUE(soon(kPatience, [&] { return !other.write(feedback) || run->code(); }));
+  EXPECT_EQ(run->code(), 3);
+  EXPECT_THAT(run->err(), HasSubstr("ROS_DOMAIN_ID"));
+  EXPECT_THAT(run->left_over(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace jostle::tests

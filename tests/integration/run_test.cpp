@@ -1,0 +1,151 @@
+// jostle run from start to grasp: what it leaves behind, and that a plan does
+// not depend on who computed it.
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "services/dds/reader.hpp"
+#include "services/dds/topics.hpp"
+#include "tests/support/run_fixture.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class Run : public RunFixture {
+ protected:
+  std::string result_file() const { return folder.path() / "result.json"; }
+
+  json result() const { return json::parse(contents(result_file()), nullptr, false); }
+
+  // An honest search of several iterations; that no plan is good enough for
+  // success makes it run them all.
+  std::string three_iterations() const {
+    return folder.write("three.yaml", "objective: {success_cost: 1.0e-9}\ncontrol: {many_iterations: 3}\n");
+  }
+};
+
+TEST_F(Run, GraspsTheTargetOfAnEasySceneAndTellsAll) {
+  ASSERT_EQ(finish({easy, "--workers", "2", "--seed", "7", "--json", result_file()}), 0) << run->err();
+
+  const json report = result();
+  for (const char* key : {"success", "reason", "scene_hash", "seed", "controller", "uncertainty", "pool",
+                          "workers", "plan_hash", "cost", "iterations", "replans", "actions",
+                          "plan_seconds", "total_seconds", "rollouts", "dropped_objects"}) {
+    EXPECT_TRUE(report.contains(key)) << key;
+  }
+  EXPECT_EQ(report["success"], true);
+  EXPECT_EQ(report["seed"], 7);
+  EXPECT_EQ(report["controller"], "or");
+  EXPECT_EQ(report["uncertainty"], "none");
+  EXPECT_EQ(report["pool"], "dds");
+  EXPECT_EQ(report["workers"], 2);
+  EXPECT_EQ(report["dropped_objects"], json::array());
+  EXPECT_GE(report["actions"], 1);
+  EXPECT_GE(report["rollouts"], 1);
+  EXPECT_GE(report["total_seconds"], report["plan_seconds"]);
+  EXPECT_THAT(run->out(), HasSubstr("SUCCESS"));
+  EXPECT_TRUE(run_folders().empty());
+}
+
+TEST_F(Run, NamesTheSceneByTheHashThatCheckPrints) {
+  const auto check = program("jostle_scene", {"check", easy});
+  ASSERT_EQ(check->wait(kPatience), 0);
+
+  ASSERT_EQ(finish({easy, "--parameters", plain, "--plan-only", "--pool", "threads", "--json",
+                    result_file()}), 0) << run->err();
+
+  EXPECT_EQ("ok " + result()["scene_hash"].get<std::string>() + "\n", check->out());
+}
+
+TEST_F(Run, PlanOnlyMovesNothing) {
+  ASSERT_EQ(finish({easy, "--parameters", plain, "--plan-only", "--workers", "1", "--json",
+                    result_file()}), 0) << run->err();
+
+  EXPECT_EQ(result()["actions"], 0);
+  EXPECT_EQ(result()["replans"], 0);
+  EXPECT_THAT(run->err(), Not(HasSubstr("acting")));
+}
+
+TEST_F(Run, NaiveReplanningWithThreadsUnderUncertainty) {
+  ASSERT_EQ(finish({easy, "--parameters", plain, "--controller", "nr", "--pool", "threads",
+                    "--uncertainty", "low", "--json", result_file()}), 0) << run->err();
+
+  EXPECT_EQ(result()["controller"], "nr");
+  EXPECT_EQ(result()["pool"], "threads");
+  EXPECT_EQ(result()["uncertainty"], "low");
+  EXPECT_EQ(result()["success"], true);
+}
+
+TEST_F(Run, WithoutWorkersOfItsOwnItTakesThoseOnTheDomain) {
+  const WorkerProcess worker(domain);
+
+  EXPECT_EQ(finish({easy, "--parameters", plain, "--plan-only", "--workers", "0"}), 0) << run->err();
+}
+
+TEST_F(Run, PlanIsTheSameForEveryPoolAndWhenAWorkerDies) {
+  struct Case {
+    const char *pool, *workers;
+    bool kill_one;
+  };
+  const std::vector<std::string> task{easy, "--plan-only", "--parameters", three_iterations(), "--json",
+                                      result_file()};
+  std::optional<json> first;
+  for (const Case& c : {Case{"threads", "1", false}, Case{"threads", "2", false}, Case{"dds", "1", false},
+                        Case{"dds", "2", false}, Case{"dds", "2", true}}) {
+    SCOPED_TRACE(fmt::format("{} {}{}", c.pool, c.workers, c.kill_one ? ", one killed" : ""));
+    std::vector<std::string> arguments = task;
+    arguments.insert(arguments.end(), {"--pool", c.pool, "--workers", c.workers});
+    start(arguments);
+    if (c.kill_one) {
+      ASSERT_TRUE(run->says("planning  iteration  1", kPatience)) << run->err();
+      const pid_t victim = run->child("jostle_worker");
+      ASSERT_GT(victim, 0);
+      kill(victim, SIGKILL);
+    }
+
+    ASSERT_EQ(run->wait(kPatience), 1) << run->err();  // no plan is good enough
+
+    const json report = result();
+    if (!first) first = report;
+    EXPECT_EQ(report["iterations"], 3);
+    EXPECT_EQ(report["plan_hash"], (*first)["plan_hash"]);
+    EXPECT_EQ(report["cost"], (*first)["cost"]);
+    EXPECT_EQ(report["rollouts"], (*first)["rollouts"]);
+    if (c.kill_one) {
+      EXPECT_THAT(run->err(), HasSubstr("killed by signal 9"));
+    }
+  }
+}
+
+TEST_F(Run, WorkerStartedByHandJoinsAPlanThatRuns) {
+  start_planning();
+  const auto participant = dds::Participant::open({.domain = domain}).value();
+  dds::Inbox<jostle_msgs::msg::Feedback> feedback(participant, topics::kTaskFeedback, 64);
+
+  const WorkerProcess late(domain);
+  const auto started = Clock::now();
+  const std::string name_end = fmt::format("-{}", late.pid());
+  const bool works = soon(10s, [&] {
+    for (const auto& news : feedback.take_all()) {
+      for (const auto& worker : news.workers()) {
+        if (worker.name().ends_with(name_end) && worker.alive() && worker.rollouts() > 0) return true;
+      }
+    }
+    return false;
+  });
+  const std::chrono::duration<double> took = Clock::now() - started;
+
+  ASSERT_TRUE(works) << run->err();
+  fmt::print("first rollouts of the new worker reported after {:.2f} s\n", took.count());
+  EXPECT_LT(took, 3s);  // about one when the machine is not loaded
+  EXPECT_FALSE(run->code()) << run->err();
+}
+
+}  // namespace
+}  // namespace jostle::tests

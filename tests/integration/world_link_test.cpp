@@ -1,0 +1,316 @@
+// Both ends of the world's wire, and the coordinator's, against made-up peers.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <functional>
+
+#include "services/dds/reader.hpp"
+#include "services/dds/topics.hpp"
+#include "services/world_link/messages.hpp"
+#include "services/world_link/world_client.hpp"
+#include "tests/support/run_fixture.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace jostle_msgs::msg;
+using ::testing::HasSubstr;
+using services::ObjectsClient;
+using services::RobotClient;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr services::WorldClientOptions kImpatient{.silence = 300ms, .start = 1000ms};
+
+class WorldLink : public RunFixture {
+ protected:
+  auto deadline() const { return std::chrono::steady_clock::now() + kPatience; }
+
+  const dds::Participant participant = dds::Participant::open({.domain = domain}).value();
+};
+
+// A world that is only what a test says.
+class MadeUpWorld : public WorldLink {
+ protected:
+  void say(const ObjectStates& states) {
+    ASSERT_TRUE(objects_writer.wait_for_readers(deadline()));
+    ASSERT_TRUE(objects_writer.write(states));
+  }
+
+  ObjectStates good_states() {
+    return services::to_message({{.name = "target", .position = {1, 2, 3}, .orientation = {1, 0, 0, 0}}}, 0.5);
+  }
+
+  dds::Writer<ObjectStates> objects_writer{participant, topics::kObjectStates};
+  dds::Writer<RobotStatus> status_writer{participant, topics::kRobotStatus};
+  RobotClient robot{participant, kImpatient};
+  ObjectsClient objects{participant, robot, kImpatient};
+};
+
+TEST_F(MadeUpWorld, OnlyBadObjectsAreAnErrorThatNamesTheField) {
+  const std::pair<const char*, std::function<void(ObjectState&)>> cases[] = {
+      {".pose.position.x: got nan", [](ObjectState& s) { s.pose().position().x(kNaN); }},
+      {".pose.orientation.w: got inf", [](ObjectState& s) { s.pose().orientation().w(1 / 0.0); }},
+      {".pose.orientation: got norm 2", [](ObjectState& s) { s.pose().orientation().w(2.0); }},
+      {".angular.z: got nan", [](ObjectState& s) { s.angular().z(kNaN); }}};
+  std::uint64_t rejected = 0;
+  for (const auto& [problem, spoil] : cases) {
+    ObjectStates states = good_states();
+    spoil(states.objects()[0]);
+    ASSERT_NO_FATAL_FAILURE(say(states));
+
+    const auto readings_result = objects.read();
+
+    ASSERT_FALSE(readings_result);
+    EXPECT_EQ(readings_result.error().code, Code::kInvalidArgument);
+    EXPECT_THAT(readings_result.error().message, HasSubstr("rt/objects/states: objects[0] ('target')"));
+    EXPECT_THAT(readings_result.error().message, HasSubstr(problem));
+    EXPECT_EQ(objects.rejected(), ++rejected);
+  }
+}
+
+TEST_F(MadeUpWorld, GoodObjectsAfterBadOnesAreTaken) {
+  ObjectStates bad = good_states();
+  bad.objects()[0].pose().position().x(kNaN);
+  ASSERT_NO_FATAL_FAILURE(say(bad));
+  ASSERT_NO_FATAL_FAILURE(say(good_states()));
+
+  const auto readings_result = objects.read();
+
+  ASSERT_TRUE(readings_result) << readings_result.error().message;
+  ASSERT_EQ(readings_result->size(), 1u);
+  EXPECT_EQ(readings_result->front().position, (std::array<double, 3>{1, 2, 3}));
+}
+
+TEST_F(MadeUpWorld, SilenceIsAnErrorThatSaysWhatToStart) {
+  const auto robot_result = robot.read();
+  const auto objects_result = objects.read();
+
+  ASSERT_FALSE(robot_result);
+  ASSERT_FALSE(objects_result);
+  EXPECT_EQ(robot_result.error().code, Code::kUnavailable);
+  EXPECT_THAT(robot_result.error().message, HasSubstr("nobody publishes rt/robot/status"));
+  EXPECT_THAT(objects_result.error().message, HasSubstr("nobody publishes rt/objects/states"));
+  EXPECT_THAT(objects_result.error().message, HasSubstr("jostle sim"));
+}
+
+TEST_F(MadeUpWorld, OnlyBadRobotStatesAreAnErrorThatNamesTheField) {
+  RobotStatus status;
+  status.q({0.0, kNaN});
+  ASSERT_TRUE(status_writer.wait_for_readers(deadline()));
+  // While it reads: what came before is yesterday's news.
+  const std::jthread speaker([&](std::stop_token stop) {
+    soon(kPatience, [&] { return !status_writer.write(status) || stop.stop_requested(); });
+  });
+
+  const auto robot_result = robot.read();
+
+  ASSERT_FALSE(robot_result);
+  EXPECT_EQ(robot_result.error().code, Code::kInvalidArgument);
+  EXPECT_THAT(robot_result.error().message, HasSubstr("rt/robot/status: q[1]: got nan"));
+}
+
+// jostle_sim, commanded by hand.
+class SimulatedWorldProcess : public WorldLink {
+ protected:
+  void SetUp() override { ASSERT_TRUE(commands.wait_for_readers(deadline())) << sim->err(); }
+
+  static VelocityCommand command(std::uint64_t epoch, std::uint64_t number) {
+    VelocityCommand command;
+    command.epoch(epoch);
+    command.sequence_number(number);
+    command.velocities({0.05, 0.0, 0.0, 0.0});
+    command.duration(0.2);
+    return command;
+  }
+
+  // The first status that fits, or nothing.
+  std::optional<RobotStatus> status_that(const std::function<bool(const RobotStatus&)>& fits) {
+    const auto end = deadline();
+    while (auto status = statuses.take(end)) {
+      if (fits(*status)) return status;
+    }
+    return {};
+  }
+
+  std::optional<RobotStatus> finished(std::uint64_t epoch, std::uint64_t number) {
+    return status_that([=](const RobotStatus& status) {
+      return status.epoch() == epoch && status.sequence_number() == number && !status.busy();
+    });
+  }
+
+  const std::unique_ptr<ProgramProcess> sim = program("jostle_sim", {easy});
+  dds::Inbox<RobotStatus> statuses{participant, topics::kRobotStatus, 64};
+  dds::Writer<VelocityCommand> commands{participant, topics::kRobotCommand};
+};
+
+TEST_F(SimulatedWorldProcess, RefusesBadCommandsByFieldAndTakesTheNextGoodOne) {
+  const std::pair<const char*, std::function<void(VelocityCommand&)>> cases[] = {
+      {"velocities: got 3 values, wanted 4", [](auto& c) { c.velocities({0.0, 0.0, 0.0}); }},
+      {"velocities: got 64 values, wanted 4", [](auto& c) { c.velocities(std::vector<double>(64, 0.0)); }},
+      {"velocities[2]: got nan", [](auto& c) { c.velocities({0.0, 0.0, kNaN, 0.0}); }},
+      {"velocities[0]: got 1e+300", [](auto& c) { c.velocities({1e300, 0.0, 0.0, 0.0}); }},
+      {"duration: got nan", [](auto& c) { c.duration(kNaN); }},
+      {"duration: got -1", [](auto& c) { c.duration(-1.0); }},
+      {"duration: got 1e+18", [](auto& c) { c.duration(1e18); }}};
+  std::uint64_t number = 0;
+  commands.write(command(5, ++number));
+  auto before = finished(5, number);
+  ASSERT_TRUE(before);
+  for (const auto& [problem, spoil] : cases) {
+    VelocityCommand bad = command(5, ++number);
+    spoil(bad);
+    commands.write(bad);
+
+    const auto refusal = status_that([](const RobotStatus& status) { return !status.error().empty(); });
+
+    ASSERT_TRUE(refusal) << sim->err();
+    EXPECT_THAT(refusal->error(), HasSubstr(fmt::format("command {}: {}", number, problem)));
+    EXPECT_EQ(refusal->q(), before->q());
+    commands.write(command(5, ++number));
+    const auto after = finished(5, number);
+    ASSERT_TRUE(after) << sim->err();
+    EXPECT_EQ(after->error(), "");
+    // Moves back, so that all cases start from the same place.
+    VelocityCommand back = command(5, ++number);
+    back.velocities({-0.05, 0.0, 0.0, 0.0});
+    commands.write(back);
+    const auto home = finished(5, number);
+    ASSERT_TRUE(home);
+    EXPECT_NEAR(home->q()[0], before->q()[0], 5e-3);
+    before = home;
+  }
+}
+
+TEST_F(SimulatedWorldProcess, DropsCommandsOfAnOlderEpochAndOnesAlreadyDone) {
+  commands.write(command(5, 1));
+  const auto first = finished(5, 1);
+  ASSERT_TRUE(first) << sim->err();
+  EXPECT_GT(first->q()[0], -0.33 + 5e-3);
+
+  commands.write(command(5, 1));
+  commands.write(command(4, 2));
+  ASSERT_TRUE(sim->says("command 4/2 is stale (2 so far), dropped", kPatience)) << sim->err();
+  const auto after = status_that([](const RobotStatus& status) { return !status.busy(); });
+  ASSERT_TRUE(after);
+  EXPECT_EQ(after->epoch(), 5u);
+  EXPECT_EQ(after->q(), first->q());
+
+  commands.write(command(6, 1));  // a new commander starts counting anew
+  EXPECT_TRUE(finished(6, 1)) << sim->err();
+}
+
+TEST_F(SimulatedWorldProcess, BadCommandOfAStrangerIsNotTheCommandersError) {
+  commands.write(command(5, 1));
+  ASSERT_TRUE(finished(5, 1)) << sim->err();
+  VelocityCommand bad = command(9, 1);
+  bad.duration(kNaN);
+
+  commands.write(bad);
+
+  ASSERT_TRUE(sim->says("duration: got nan", kPatience)) << sim->err();
+  commands.write(command(5, 2));
+  const auto after = finished(5, 2);
+  ASSERT_TRUE(after) << sim->err();
+  EXPECT_EQ(after->error(), "");
+}
+
+// jostle_coordinator and a world, asked by hand.
+class CoordinatorProcess : public WorldLink {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(goals.wait_for_readers(deadline())) << coordinator->err();
+    ASSERT_TRUE(cancels.wait_for_readers(deadline())) << coordinator->err();
+    ASSERT_TRUE(soon(kPatience, [&] { return results.matched() == 1; }));
+  }
+
+  Goal goal(const std::string& id) const {
+    Goal goal;
+    goal.goal_id(id);
+    goal.execution_scene(contents(easy));
+    goal.planning_scene(contents(easy));
+    goal.parameters("control: {many_iterations: 1}\n");
+    goal.controller("or");
+    goal.plan_only(true);
+    return goal;
+  }
+
+  GoalResult result_of(const std::string& id) {
+    const auto end = deadline();
+    while (auto result = results.take(end)) {
+      if (result->goal_id() == id) return *result;
+    }
+    ADD_FAILURE() << "no result of " << id << "\n" << coordinator->err();
+    return {};
+  }
+
+  const std::unique_ptr<ProgramProcess> sim = program("jostle_sim", {easy});
+  const std::unique_ptr<ProgramProcess> coordinator =
+      program("jostle_coordinator", {"--pool", "threads", "--threads", "1"});
+  dds::Writer<Goal> goals{participant, topics::kTaskGoal};
+  dds::Writer<Cancel> cancels{participant, topics::kTaskCancel};
+  dds::Inbox<GoalResult> results{participant, topics::kTaskResult, 64};
+};
+
+TEST_F(CoordinatorProcess, AnswersBadGoalsWithTheFieldAndGoesOnServing) {
+  const std::pair<const char*, std::function<void(Goal&)>> cases[] = {
+      {"goal.execution_scene", [](Goal& g) { g.execution_scene("\x01\xff garbage: ["); }},
+      {"goal.execution_scene", [](Goal& g) { g.execution_scene(""); }},
+      {"goal.planning_scene", [](Goal& g) { g.planning_scene("jostle_scene: 1\n"); }},
+      {"goal.parameters", [](Goal& g) { g.parameters("planner: {rollouts: -3}\n"); }},
+      {"goal.parameters", [](Goal& g) { g.parameters(std::string(1000, '[')); }},
+      {"controller: got 'psychic'", [](Goal& g) { g.controller("psychic"); }}};
+  int count = 0;
+  for (const auto& [field, spoil] : cases) {
+    Goal bad = goal(fmt::format("bad-{}", ++count));
+    spoil(bad);
+    goals.write(bad);
+
+    const GoalResult result = result_of(bad.goal_id());
+
+    EXPECT_FALSE(result.success());
+    EXPECT_THAT(result.error(), HasSubstr(field));
+    EXPECT_EQ(result.report(), "");
+  }
+  goals.write(goal("good"));
+  const GoalResult result = result_of("good");
+  EXPECT_EQ(result.error(), "");
+  EXPECT_TRUE(result.success()) << result.reason();
+}
+
+TEST_F(CoordinatorProcess, BelievedWorldOfOtherObjectsIsAnErrorThatNamesThem) {
+  Goal other = goal("other");
+  physics_pool::Scene scene = three_objects();
+  scene.objects[1].name = "teapot";
+  other.planning_scene(physics_pool::to_yaml(scene));
+
+  goals.write(other);
+
+  EXPECT_THAT(result_of("other").error(), HasSubstr("teapot"));
+}
+
+TEST_F(CoordinatorProcess, RefusesASecondGoalWhileBusyAndObeysCancel) {
+  Goal endless_goal = goal("first");
+  endless_goal.parameters(contents(endless));
+  goals.write(endless_goal);
+  goals.write(goal("second"));
+
+  const GoalResult refusal = result_of("second");
+
+  EXPECT_FALSE(refusal.success());
+  EXPECT_THAT(refusal.error(), HasSubstr("busy with goal first"));
+
+  Cancel cancel;
+  cancel.goal_id("somebody else's");
+  cancels.write(cancel);
+  cancel.goal_id("first");
+  cancels.write(cancel);
+  EXPECT_EQ(result_of("first").reason(), "cancelled");
+
+  goals.write(goal("third"));
+  EXPECT_TRUE(result_of("third").success());
+}
+
+}  // namespace
+}  // namespace jostle::tests

@@ -88,7 +88,7 @@ TEST_F(BadInput, ParametersAreRefusedWithFileFieldGotAndWanted) {
 // A stranger on the domain of a run that acts.
 class Stranger : public RunFixture {
  protected:
-  void SetUp() override { ASSERT_NO_FATAL_FAILURE(start_acting()); }
+  void SetUp() override { ASSERT_NO_FATAL_FAILURE(start_acting(2)); }
 
   // What the world says of itself now, or nothing.
   std::optional<jostle_msgs::msg::RobotStatus> status() {

@@ -21,7 +21,7 @@ using services::ObjectsClient;
 using services::RobotClient;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr services::WorldClientOptions kImpatient{.silence = 300ms, .start = 1000ms};
+constexpr services::WorldClientOptions kImpatient{.silence = 300ms, .start = 500ms};
 
 class WorldLink : public RunFixture {
  protected:

@@ -54,9 +54,10 @@ class RunFixture : public ::testing::Test {
     ASSERT_TRUE(run->says("planning  iteration  1", kPatience)) << run->err();
   }
 
-  /// A run whose world takes its time, one action done.
-  void start_acting() {
-    start({easy, "--workers", "2", "--rate", "1", "--parameters", plain});
+  /// A run whose world takes its time, one action done. Six actions take
+  /// 6 s / `rate`.
+  void start_acting(int rate = 1) {
+    start({easy, "--workers", "2", "--rate", std::to_string(rate), "--parameters", plain});
     ASSERT_TRUE(soon(kPatience, [&] { return executed(1) || run->code(); })) << run->err();
     ASSERT_FALSE(run->code()) << run->err();
   }

@@ -10,7 +10,7 @@ Result<Measurements> measure_pool_dds(const Settings& settings) {
   if (!scene_result) return scene_result.error();
   auto world_result = physics_pool::World::compile(*scene_result);
   if (!world_result) return world_result.error();
-  auto swarm_result = Swarm::start(kWorkers, settings.domain, settings.stop);
+  auto swarm_result = Swarm::start({.workers = kWorkers, .domain = settings.domain, .stop = settings.stop});
   if (!swarm_result) return swarm_result.error();
   RemotePool& pool = (*swarm_result)->pool();
   if (auto loaded = pool.load(*scene_result); !loaded) return loaded.error();

@@ -41,7 +41,7 @@ Result<Measurement> measure_with(int workers, const Settings& settings) {
   batch.wait = kWait;
 
   const auto start = std::chrono::steady_clock::now();
-  auto swarm_result = Swarm::start(workers, settings.domain, settings.stop);
+  auto swarm_result = Swarm::start({.workers = workers, .domain = settings.domain, .stop = settings.stop});
   if (!swarm_result) return swarm_result.error();
   const double gathering = seconds_since(start);
   RemotePool& pool = (*swarm_result)->pool();

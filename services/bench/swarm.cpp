@@ -14,7 +14,17 @@ constexpr std::chrono::milliseconds kGlance{200};
 
 }  // namespace
 
-Helpers::Helpers(int domain) : domain_(domain) {}
+Pinned::Pinned(int core) {
+  sched_getaffinity(0, sizeof before_, &before_);
+  cpu_set_t only;
+  CPU_ZERO(&only);
+  CPU_SET(core, &only);
+  sched_setaffinity(0, sizeof only, &only);
+}
+
+Pinned::~Pinned() { sched_setaffinity(0, sizeof before_, &before_); }
+
+Helpers::Helpers(int domain, std::optional<int> core) : domain_(domain), core_(core) {}
 
 Helpers::~Helpers() {
   // All at once, then one after the other: ending takes as long as the slowest.
@@ -31,6 +41,8 @@ Result<void> Helpers::start(const std::string& program, std::vector<std::string>
     folder_ = name;
   }
   arguments.insert(arguments.end(), {"--domain", std::to_string(domain_)});
+  std::optional<Pinned> pinned;
+  if (core_) pinned.emplace(*core_);
   auto child_result = ChildProcess::start(program_folder() / program, arguments,
                                           folder_ / fmt::format("{}.log", children_.size()));
   if (!child_result) return child_result.error();
@@ -56,18 +68,18 @@ double Helpers::cpu_seconds() const {
   return sum;
 }
 
-Swarm::Swarm(const dds::Participant& participant, int domain)
-    : helpers_(domain), participant_(participant), pool_(participant_) {}
+Swarm::Swarm(const dds::Participant& participant, const SwarmOptions& options)
+    : helpers_(options.domain, options.core), participant_(participant), pool_(participant_) {}
 
-Result<std::unique_ptr<Swarm>> Swarm::start(int workers, int domain, std::stop_token stop) {
-  auto participant_result = dds::Participant::open({.name = "jostle_bench", .domain = domain});
+Result<std::unique_ptr<Swarm>> Swarm::start(const SwarmOptions& options) {
+  auto participant_result = dds::Participant::open({.name = "jostle_bench", .domain = options.domain});
   if (!participant_result) return participant_result.error();
-  std::unique_ptr<Swarm> swarm(new Swarm(*participant_result, domain));
-  for (int i = 0; i < workers; ++i) {
+  std::unique_ptr<Swarm> swarm(new Swarm(*participant_result, options));
+  for (int i = 0; i < options.workers; ++i) {
     auto ok = swarm->helpers_.start("jostle_worker", {"--name", fmt::format("worker-{}", i), "--die-with-parent"});
     if (!ok) return ok.error();
   }
-  if (auto ok = swarm->gather(workers, stop); !ok) return ok.error();
+  if (auto ok = swarm->gather(options.workers, options.stop); !ok) return ok.error();
   return swarm;
 }
 

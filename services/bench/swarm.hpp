@@ -2,8 +2,12 @@
 /// \file
 /// Worker processes to be measured, and the pool that uses them.
 
+#include <sched.h>
+
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -17,7 +21,8 @@ namespace jostle::services {
 /// with it, and so does the folder of their logs.
 class Helpers {
  public:
-  explicit Helpers(int domain);
+  /// `core`: the only one they run on, if given.
+  Helpers(int domain, std::optional<int> core);
   ~Helpers();
   Helpers(const Helpers&) = delete;
   Helpers& operator=(const Helpers&) = delete;
@@ -34,8 +39,29 @@ class Helpers {
 
  private:
   const int domain_;
+  const std::optional<int> core_;
   std::filesystem::path folder_;
   std::vector<ChildProcess> children_;
+};
+
+/// The calling thread, and the threads and processes it starts, run on one core
+/// until the end of the scope.
+class Pinned {
+ public:
+  explicit Pinned(int core);
+  ~Pinned();
+  Pinned(const Pinned&) = delete;
+  Pinned& operator=(const Pinned&) = delete;
+
+ private:
+  cpu_set_t before_;
+};
+
+struct SwarmOptions {
+  int workers = 1;
+  int domain = 0;
+  std::optional<int> core;  ///< the only one the workers run on, if given
+  std::stop_token stop;
 };
 
 /// Workers of one thread each and a client in the same domain.
@@ -44,7 +70,7 @@ class Swarm {
   /// Returns when all workers can be used.
   /// Errors   kUnavailable  not all of them in time; says how one ended, if it did
   ///          kCancelled    a stop was requested
-  static Result<std::unique_ptr<Swarm>> start(int workers, int domain, std::stop_token stop);
+  static Result<std::unique_ptr<Swarm>> start(const SwarmOptions& options);
 
   RemotePool& pool() { return pool_; }
   const dds::Participant& participant() const { return participant_; }
@@ -54,7 +80,7 @@ class Swarm {
   }
 
  private:
-  Swarm(const dds::Participant& participant, int domain);
+  Swarm(const dds::Participant& participant, const SwarmOptions& options);
   Result<void> gather(int workers, std::stop_token stop);
 
   Helpers helpers_;  // outlives the pool, which would report their end as a loss

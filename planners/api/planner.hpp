@@ -23,6 +23,7 @@ struct Problem {
   int iterations = 50;      ///< I_max
   std::uint64_t seed = 0;
   std::uint32_t stream = 0; ///< first noise stream; one is used per iteration
+  bool clear_hand = false;  ///< let Objective::obstruction count
 };
 
 /// The best sequence found, even if it does not reach the goal.

@@ -61,16 +61,24 @@ class Run {
   Result<void> online() {
     if (auto ok = observe(); !ok) return ok;
     if (auto ok = plan(straight(), options_.many_iterations); !ok) return ok;
-    while (!ended()) {
-      if (auto ok = act(); !ok) return ok;
-      if (ended()) break;
-      const bool deviated = state_deviation(layout(), plan_.states.front(), x_) > options_.deviation_threshold;
-      const bool few_left = plan_.controls.steps() < std::max(options_.min_steps, 1);
-      if (!plan_.grasped || deviated || few_left) {
+    for (;;) {
+      if (auto over_result = over(); !over_result) return over_result.error();
+      else if (*over_result) return conclude();
+      if (needs_replan()) {
         if (auto ok = replan(); !ok) return ok;
+      } else {
+        replans_in_a_row_ = 0;
       }
+      if (auto ok = act(); !ok) return ok;
     }
-    return finish();
+  }
+
+  // Lines 8 to 10.
+  bool needs_replan() const {
+    if (outcome_.actions == acted_at_plan_) return plan_.controls.steps() == 0;  // fresh
+    const bool deviated = state_deviation(layout(), plan_.states.front(), x_) > options_.deviation_threshold;
+    const bool few_left = plan_.controls.steps() < std::max(options_.min_steps, 1);
+    return !plan_.grasped || deviated || few_left;
   }
 
   // Lines 11 and 12. Where the last plan fell short of the target the horizon
@@ -82,6 +90,7 @@ class Run {
     ControlSequence controls = plan_.controls;
     while (controls.steps() < wanted) controls.append(straight_step(plan_.states.back()));
     ++outcome_.replans;
+    ++replans_in_a_row_;
     if (auto ok = plan(controls, replan_iterations_); !ok) return ok;
     replan_iterations_ = plan_.grasped ? options_.few_iterations
                                        : std::min(2 * replan_iterations_, options_.few_iterations_max);
@@ -91,14 +100,15 @@ class Run {
   // Alg. 3.
   Result<void> naive() {
     if (auto ok = observe(); !ok) return ok;
-    while (!ended()) {
+    for (;;) {
+      if (auto over_result = over(); !over_result) return over_result.error();
+      else if (*over_result) return conclude();
       if (plan_made_) ++outcome_.replans;
       if (auto ok = plan(straight(), options_.many_iterations); !ok) return ok;
       while (!options_.plan_only && plan_.controls.steps() > 0) {
         if (auto ok = act(); !ok) return ok;
       }
     }
-    return finish();
   }
 
   Result<void> plan(const ControlSequence& initial, int iterations) {
@@ -109,10 +119,13 @@ class Run {
                     .initial = initial,
                     .iterations = iterations,
                     .seed = setup_.seed,
-                    .stream = stream_};
+                    .stream = stream_,
+                    .clear_hand = replans_in_a_row_ > options_.obstruction_patience &&
+                                  physics_pool::count_obstructions(setup_.geometry, x_) > 0};
     auto plan_result = setup_.planner.plan(problem, deadline_, stop_);
     if (!plan_result) return plan_result.error();
     plan_ = std::move(plan_result).value();
+    acted_at_plan_ = outcome_.actions;
     stream_ += static_cast<std::uint32_t>(iterations);
     outcome_.rollouts += plan_.rollouts;
     outcome_.iterations += plan_.iterations;
@@ -155,22 +168,27 @@ class Run {
     return {};
   }
 
-  bool ended() const {
-    return in_hand_ || !outcome_.dropped.empty() || (options_.plan_only && plan_made_);
+  // Whether the task has ended; closes the hand on the target to be sure, and
+  // opens it again if the target slipped out.
+  Result<bool> over() {
+    if (!outcome_.dropped.empty() || (options_.plan_only && plan_made_)) return true;
+    if (!in_hand_) return false;
+    if (!options_.close_hand) return true;
+    if (auto ok = move_fingers(-hand::kStroke); !ok) return ok.error();
+    if (in_hand_ || !outcome_.dropped.empty()) return true;
+    if (auto ok = move_fingers(hand::kStroke); !ok) return ok.error();
+    plan_.controls = {};
+    plan_.states = {x_};
+    plan_.grasped = false;
+    return !outcome_.dropped.empty();
   }
 
-  Result<void> finish() {
-    const bool reached = in_hand_;
-    if (reached && outcome_.dropped.empty() && options_.close_hand) {
-      if (auto ok = close_hand(); !ok) return ok;
-    }
+  Result<void> conclude() {
     if (!outcome_.dropped.empty()) {
       outcome_.reason = fmt::format("dropped {}", fmt::join(outcome_.dropped, ", "));
     } else if (in_hand_) {
       outcome_.success = true;
       outcome_.reason = "target grasped";
-    } else if (reached) {
-      outcome_.reason = "target slipped out of the closing hand";
     } else {
       outcome_.success = plan_.grasped;
       outcome_.reason = plan_.grasped ? "plan reaches the target; not executed"
@@ -179,11 +197,11 @@ class Run {
     return {};
   }
 
-  // Until the fingers have met the target or each other.
-  Result<void> close_hand() {
+  // Opens or closes by `way` metres, or until the fingers meet something.
+  Result<void> move_fingers(double way) {
     notify(Phase::kClosing);
     std::vector<double> u(kControlAxes, 0.0);
-    u[kControlOpening] = -hand::kStroke / options_.step_duration;
+    u[kControlOpening] = way / options_.step_duration;
     if (auto ok = setup_.robot.execute(u, options_.step_duration, stop_); !ok) return ok;
     return observe();
   }
@@ -230,6 +248,8 @@ class Run {
   bool plan_made_ = false;
   std::uint32_t stream_ = 0;
   int replan_iterations_;  // FewIter, grown
+  int replans_in_a_row_ = 0;
+  int acted_at_plan_ = -1;  // actions executed when the present plan was made
   Outcome outcome_;
 };
 

@@ -30,6 +30,9 @@ struct ControlOptions {
   /// target, up to this: brief while it suffices, thorough once the hand is
   /// stuck. Equal to few_iterations it is Alg. 2 to the letter.
   int few_iterations_max = 8;
+  /// After so many re-plans in a row, plans must also clear the hand of what has
+  /// lodged in it: predictions that counted on grasping past it have failed.
+  int obstruction_patience = 3;
   int min_steps = 2;         ///< n_min
   /// SD_thresh: largest |x_predicted - x_observed|, over robot joints (m, rad)
   /// and objects (m, and rad of rotation).

@@ -34,6 +34,7 @@ struct Pbsto::Run {
                  .scales = options.scales,
                  .seed = problem.seed};
     batch.objective = options.objective;
+    if (!problem.clear_hand) batch.objective.obstruction = 0.0;
     batch.stop_on_success = true;
     batch.min_steps = options.min_steps;
     return batch;

@@ -81,11 +81,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 232));
   app.footer("Exit codes: 0 measured, 1 the two sides computed different things, 2 bad arguments,\n"
              "3 a part of the system failed, 130 interrupted. Slowness is no failure.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kExitOk : kExitUsage;
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
   const StopSignal signal;
   settings.stop = signal.token();
   try {

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -147,7 +148,7 @@ Result<Measurements> measure_round_trip(const Settings& settings) {
 }
 
 int serve_echo(int domain, std::stop_token stop) {
-  die_with_parent();
+  die_with_parent(getppid());
   auto participant_result = dds::Participant::open({.name = "jostle_bench_echo", .domain = domain});
   if (!participant_result) {
     fmt::print(stderr, "jostle bench: {}\n", participant_result.error().message);

@@ -1,6 +1,7 @@
 #include "services/bench/swarm.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 #include <stdlib.h>
 #include <time.h>
 
@@ -76,7 +77,7 @@ Result<std::unique_ptr<Swarm>> Swarm::start(const SwarmOptions& options) {
   if (!participant_result) return participant_result.error();
   std::unique_ptr<Swarm> swarm(new Swarm(*participant_result, options));
   for (int i = 0; i < options.workers; ++i) {
-    auto ok = swarm->helpers_.start("jostle_worker", {"--name", fmt::format("worker-{}", i), "--die-with-parent"});
+    auto ok = swarm->helpers_.start("jostle_worker", {"--name", fmt::format("worker-{}", i), "--die-with-parent", std::to_string(getpid())});
     if (!ok) return ok.error();
   }
   if (auto ok = swarm->gather(options.workers, options.stop); !ok) return ok.error();

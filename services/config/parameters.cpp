@@ -59,6 +59,7 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("few_iterations", control.few_iterations);
     in.optional("few_iterations_max", control.few_iterations_max);
     in.optional("deviation_threshold", control.deviation_threshold);
+    in.optional("obstruction_patience", control.obstruction_patience);
     in.optional("initial_steps", control.initial_steps);
     in.optional("straight_speed", control.straight_speed);
     in.optional("close_hand", control.close_hand);
@@ -87,6 +88,7 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
                              Range{"control.many_iterations", double(control.many_iterations), 0, 1e6},
                              Range{"control.few_iterations", double(control.few_iterations), 0, 1e6},
                              Range{"control.few_iterations_max", double(control.few_iterations_max), 0, 1e6},
+                             Range{"control.obstruction_patience", double(control.obstruction_patience), 0, 1e6},
                              Range{"control.deviation_threshold", control.deviation_threshold, 0, 1e6},
                              Range{"control.initial_steps", double(control.initial_steps), 1, physics_pool::kMaxSteps},
                              Range{"control.straight_speed", control.straight_speed, 0, 1},

@@ -58,8 +58,8 @@ DomainParticipantQos make_qos(const std::string& name, Transport transport) {
   DomainParticipantQos qos = DomainParticipantFactory::get_instance()->get_default_participant_qos();
   qos.name(name);
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
-  discovery.leaseDuration = {1, 0};
-  discovery.leaseDuration_announcementperiod = {0, 250'000'000};
+  discovery.leaseDuration = {2, 0};
+  discovery.leaseDuration_announcementperiod = {0, 500'000'000};
   if (transport == Transport::kUdp) {
     qos.transport().use_builtin_transports = false;
     const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();

@@ -39,8 +39,8 @@ struct ParticipantOptions {
 /// everything may be destroyed in any order.
 ///
 /// Peers and the like come from the default profile of the file that
-/// FASTRTPS_DEFAULT_PROFILES_FILE names, if any. The lease (1 s) and the
-/// announcement period (250 ms) are set here: the middleware's defaults give
+/// FASTRTPS_DEFAULT_PROFILES_FILE names, if any. The lease (2 s) and the
+/// announcement period (500 ms) are set here: the middleware's defaults give
 /// joins of 3 s and stalls of 20 s.
 ///
 /// Threads  safe from any thread.

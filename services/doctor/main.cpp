@@ -63,11 +63,7 @@ int main(int argc, char** argv) {
                "jostle doctor"};
   app.add_flag("--json", as_json, "a list of {name, verdict, finding, remedy}");
   app.add_flag("--clean", clean, "first remove shared memory that killed processes left behind");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitUsage;
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (clean) remove_leftovers(find_leftovers());
   const std::vector<Check> checks = examine();
   as_json ? print_json(checks) : print_lines(checks);

@@ -5,11 +5,14 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <optional>
 #include <thread>
 
 #include "services/experiment/grasping_study.hpp"
 #include "services/support/files.hpp"
+#include "services/support/program.hpp"
 
 namespace {
 
@@ -48,14 +51,16 @@ int main(int argc, char** argv) {
   CLI::App app("Runs one of the thesis's studies and prints its table.", "jostle experiment");
   std::string name, seeds, json;
   std::vector<std::string> levels, controllers;
+  std::optional<double> timeout;
   int jobs = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
   app.add_option("name", name, "A study, or `list`")->required();
   app.add_option("--seeds", seeds, "Scenes, such as 1-10 (default: the study's)");
   app.add_option("--levels", levels, "Uncertainty levels, such as none,medium")->delimiter(',');
   app.add_option("--controllers", controllers, "Controllers, such as or,nr")->delimiter(',');
   app.add_option("--jobs", jobs, "Runs at a time")->capture_default_str()->check(CLI::Range(1, 1024));
+  app.add_option("--timeout", timeout, "Of one run, s (default: the parameters')")->check(CLI::Range(1.0, 1e6));
   app.add_option("--json", json, "File for all numbers");
-  CLI11_PARSE(app, argc, argv);
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
   if (name == "list") return list_studies();
   auto study_result = load_grasping_study(name);
@@ -68,6 +73,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "--seeds: got '{}', wanted a number or a range such as 1-10\n", seeds);
     return 2;
   }
+  if (timeout) study.parameters.control.timeout = std::chrono::milliseconds(std::llround(*timeout * 1e3));
   if (!levels.empty()) study.levels = levels;
   if (!controllers.empty()) study.controllers = controllers;
   for (const std::string& level : study.levels) {

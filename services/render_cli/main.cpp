@@ -70,11 +70,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--size", arguments.size, "WxH of each picture, pixels")->capture_default_str();
   app.add_option("--camera", arguments.options.camera, "overview or top")->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitUsage;
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (!parse_size(arguments.size, arguments.options)) {
     fmt::print(stderr, "jostle render: --size: got '{}', wanted WxH such as 640x480\n", arguments.size);
     return kExitUsage;

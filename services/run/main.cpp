@@ -91,11 +91,7 @@ int main(int argc, char** argv) {
   app.add_flag("--headless", options.headless, "Plain lines instead of a live display");
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.footer("Exit codes: 0 grasped, 1 not grasped, 2 bad input, 3 a part of the system failed, 130 interrupted.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kExitOk : kExitUsage;
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (options.pool == "threads" && options.workers == 0) {
     return fail({Code::kInvalidArgument, "--workers: got 0, wanted at least 1 thread"}, kExitUsage);
   }

@@ -75,12 +75,12 @@ Result<void> Session::start_processes() {
       program("sim"),
       {scene_file.string(), "--uncertainty", physics_pool::to_string(options_.level), "--seed",
        std::to_string(options_.seed), "--rate", fmt::format("{}", options_.rate), "--domain", domain,
-       "--die-with-parent"},
+       "--die-with-parent", std::to_string(getpid())},
       folder_ / "sim.log");
   if (!world_result) return world_result.error();
   world_process_ = std::move(world_result).value();
 
-  std::vector<std::string> arguments{"--pool", options_.pool, "--domain", domain, "--die-with-parent"};
+  std::vector<std::string> arguments{"--pool", options_.pool, "--domain", domain, "--die-with-parent", std::to_string(getpid())};
   if (options_.pool == "threads") {
     arguments.insert(arguments.end(), {"--threads", std::to_string(options_.workers)});
   }
@@ -102,7 +102,7 @@ Result<ChildProcess> Session::start_worker() {
   const std::string name = fmt::format("worker-{}", workers_started_++);
   return ChildProcess::start(
       program("worker"),
-      {"--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent"},
+      {"--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())},
       folder_ / (name + ".log"));
 }
 

@@ -132,11 +132,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Makes, checks, disturbs and shows scene files.", "jostle scene"};
   app.require_subcommand(1);
   add_commands(app, arguments, chosen);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitUsage;
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (auto ok = chosen(arguments); !ok) {
     fmt::print(stderr, "jostle scene: {}\n", ok.error().message);
     return kExitFailed;

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   std::string scene_file, level = "none";
   SimulatedWorldOptions options;
   dds::ParticipantOptions participant_options{.name = "jostle_sim"};
-  bool with_parent = false;
+  pid_t parent = 0;
   app.add_option("scene", scene_file, "Scene file")->required();
   app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")
       ->capture_default_str();
@@ -25,13 +25,9 @@ int main(int argc, char** argv) {
       ->capture_default_str()->check(CLI::Range(0.0, 1000.0));
   app.add_flag("--free-running", options.free_running, "Go on between actions instead of standing still");
   app.add_option("--domain", participant_options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
-  app.add_flag("--die-with-parent", with_parent, "End when the starting process ends");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kExitOk : kExitUsage;
-  }
-  if (with_parent) die_with_parent();
+  app.add_option("--die-with-parent", parent, "Process id of the starter: end when it ends");
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
+  die_with_parent(parent);
   const StopSignal signal;
   set_up_logging("sim");
 

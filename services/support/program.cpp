@@ -7,6 +7,7 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <thread>
 
 namespace jostle::services {
@@ -44,10 +45,19 @@ StopSignal::StopSignal() {
 
 std::stop_token StopSignal::token() const { return stop_source().get_token(); }
 
-void die_with_parent() {
-  const pid_t parent = getppid();
+void die_with_parent(pid_t parent) {
+  if (parent == 0) return;
   prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (getppid() != parent || parent == 1) raise(SIGTERM);  // it ended before we asked
+  if (getppid() != parent) raise(SIGTERM);  // it ended before we asked
+}
+
+std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv) {
+  try {
+    app.parse(argc, argv);
+    return {};
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitOk : kExitUsage;
+  }
 }
 
 void set_up_logging(const std::string& name) {

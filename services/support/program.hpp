@@ -3,8 +3,15 @@
 /// What every program does the same way: ending on a signal, dying with its
 /// parent, exit codes, logging.
 
+#include <sys/types.h>
+
+#include <optional>
 #include <stop_token>
 #include <string>
+
+namespace CLI {
+class App;
+}
 
 namespace jostle::services {
 
@@ -28,8 +35,13 @@ class StopSignal {
   std::stop_token token() const;
 };
 
-/// Ends this process when the one that started it ends, however it ends.
-void die_with_parent();
+/// Ends this process when the one that started it ends, however it ends; at once
+/// if that has happened already. `parent`: its process id; 0 does nothing.
+void die_with_parent(pid_t parent);
+
+/// Parses the command line. An exit code if the program is to end: after --help,
+/// or with kExitUsage after wrong arguments.
+std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv);
 
 /// Log lines go to standard error as "NAME: level: text".
 void set_up_logging(const std::string& name);

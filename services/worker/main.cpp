@@ -40,15 +40,15 @@ int main(int argc, char** argv) {
   CLI::App app("Runs rollouts for any planner in the same DDS domain until it is told to end.", "jostle worker");
   WorkerOptions options;
   dds::ParticipantOptions dds_options{.name = "jostle_worker"};
-  bool with_parent = false;
+  pid_t parent = 0;
   app.add_option("--threads", options.threads, "Rollouts at a time")
       ->capture_default_str()->check(CLI::Range(1, 1024));
   app.add_option("--domain", dds_options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.add_option("--name", options.name, "As clients report it (default: host and process id)");
-  app.add_flag("--die-with-parent", with_parent, "End when the starting process ends");
-  CLI11_PARSE(app, argc, argv);
+  app.add_option("--die-with-parent", parent, "Process id of the starter: end when it ends");
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
-  if (with_parent) die_with_parent();
+  die_with_parent(parent);
   const StopSignal signal;
   set_up_logging("worker");
   try {

@@ -56,6 +56,10 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::stop_token s
                    fmt::format("robot: another commander took over: its epoch is {}, ours {}",
                                status->epoch(), epoch_)};
     }
+    if (known_ && status->epoch() < epoch_) {
+      return Error{Code::kUnavailable, "robot: the world was started anew and knows nothing of this task"};
+    }
+    known_ = known_ || status->epoch() == epoch_;
     heard_ = true;
     time_ = seconds(status->header());
     return *std::move(status);

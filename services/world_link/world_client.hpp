@@ -45,6 +45,7 @@ class RobotClient final : public robot_bridge::Robot {
   const std::uint64_t epoch_;
   std::uint64_t sequence_number_ = 0;
   bool heard_ = false;
+  bool known_ = false;  // a status has named our epoch
   double time_ = 0.0;
   std::uint64_t rejected_ = 0;
 };

@@ -42,7 +42,7 @@ class WorkerProcess {
  public:
   explicit WorkerProcess(int domain, int threads = 1) {
     std::vector<std::string> words{JOSTLE_WORKER, "--domain",  std::to_string(domain), "--threads",
-                                   std::to_string(threads), "--die-with-parent"};
+                                   std::to_string(threads), "--die-with-parent", std::to_string(getpid())};
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);

@@ -118,6 +118,9 @@ const std::vector<Case> kCases{
     {"NegativeToppleAngle", [](B& b) { b.objective.topple_angle = -1; }, "objective.topple_angle", "-1", ">= 0"},
     {"NegativeDrop", [](B& b) { b.objective.drop = -1; }, "objective.drop", "-1", ">= 0"},
     {"NegativeDropHeight", [](B& b) { b.objective.drop_height = -1; }, "objective.drop_height", "-1", ">= 0"},
+    {"NoScales", [](B& b) { b.law.scales.clear(); }, "law.scales", "0 values", "1 to"},
+    {"NaNScale", [](B& b) { b.law.scales = {1, kNaN}; }, "law.scales[1]", "nan", ">= 0"},
+    {"InfiniteSigma", [](B& b) { b.law.sigma[0] = HUGE_VAL; }, "law.sigma[0]", "inf", ">= 0"},
     {"NegativeObstruction", [](B& b) { b.objective.obstruction = -1; }, "objective.obstruction", "-1", ">= 0"},
     {"NaNSuccess", [](B& b) { b.objective.success_cost = kNaN; }, "objective.success_cost", "nan", ">= 0"},
 };

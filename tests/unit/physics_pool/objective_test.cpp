@@ -257,6 +257,28 @@ TEST_F(Grasped, DoesNotCareForOtherObjects) {
   EXPECT_FALSE(grasped(geometry, start, objective));
 }
 
+TEST_F(ObjectiveTerms, ObstructionsAreOtherObjectsBetweenTheFingers) {
+  place_hand(start, 0.5, 0.2, 1.0);
+  place_in_hand(start, 0.03, 0.0);  // the target is none
+  EXPECT_EQ(count_obstructions(geometry, start), 0);
+  const auto put = [&](double forward, double left) {
+    place(start, 1, 0.5 + std::cos(1.0) * forward - std::sin(1.0) * left,
+          0.2 + std::sin(1.0) * forward + std::cos(1.0) * left);
+    return count_obstructions(geometry, start);
+  };
+  constexpr double kEps = 1e-9;
+  EXPECT_EQ(put(hand::kFingerLength / 2, 0.0), 1);
+  EXPECT_EQ(put(hand::kFingerLength + kEps, 0.0), 0);
+  EXPECT_EQ(put(-kEps, 0.0), 0);
+  EXPECT_EQ(put(0.03, start.q[kJointLeft] + kEps), 0);
+  EXPECT_EQ(put(0.03, -start.q[kJointRight] - kEps), 0);
+  Objective strict = objective;
+  strict.obstruction = 7;
+  const double clear = final_cost(geometry, strict, start);
+  ASSERT_EQ(put(0.03, 0.0), 1);
+  EXPECT_DOUBLE_EQ(final_cost(geometry, strict, start), clear + 7);
+}
+
 TEST_F(ObjectiveTerms, RunningCostIsTheWeightedSum) {
   const Objective weights{.acceleration = 3, .disturbance = 5, .disturbance_rotation = 0, .edge = 7,
                           .edge_rate = 10, .edge_exponent_max = 50, .edge_margin = 0.05,

@@ -190,6 +190,25 @@ TEST_P(EitherController, ClosesTheHandAtTheEndWhenAsked) {
   EXPECT_THAT(phases, testing::Contains(Phase::kClosing));
 }
 
+TEST_P(EitherController, OpensTheHandAndTriesAgainWhenTheTargetSlipsOut) {
+  options.close_hand = true;
+  int closings = 0, openings = 0;
+  robot.object_in_hand = false;
+  robot.after_execute = [&](State&, int) {
+    const double fingers = robot.executed.back()[kControlOpening];
+    if (fingers < -0.05) {
+      robot.object_in_hand = ++closings > 1;  // the first time it slips
+    } else if (fingers > 0.05 && closings == 1 && openings == 0) {
+      ++openings;
+    } else {
+      robot.object_in_hand = true;
+    }
+  };
+  EXPECT_TRUE(outcome().success);
+  EXPECT_EQ(closings, 2);
+  EXPECT_EQ(openings, 1);
+}
+
 TEST_P(EitherController, DoesNotCloseTheHandAfterAFailure) {
   options.close_hand = true;
   robot.after_execute = [this](State&, int) { object(1)[2] = -0.5; };
@@ -264,6 +283,36 @@ TEST_F(OnlineReplanning, ReplansAfterEveryActionWhileNoGraspIsPredicted) {
   const Outcome result = outcome();
   EXPECT_EQ(result.actions, 4);
   EXPECT_EQ(result.replans, 3);  // none before the first action, none after the last
+}
+
+TEST_F(OnlineReplanning, IteratesMoreWhileReplansFallShort) {
+  planner.predicts_grasp = false;
+  options.few_iterations_max = 6;
+  grasp_after(6);
+  (void)outcome();
+  std::vector<int> iterations;
+  for (const Problem& problem : planner.problems) iterations.push_back(problem.iterations);
+  EXPECT_THAT(iterations, testing::ElementsAre(options.many_iterations, 1, 2, 4, 6, 6));
+}
+
+TEST_F(OnlineReplanning, FillsTheHorizonUpWhileReplansFallShort) {
+  planner.predicts_grasp = false;
+  grasp_after(3);
+  (void)outcome();
+  for (const Problem& problem : planner.problems) EXPECT_EQ(problem.initial.steps(), options.initial_steps);
+}
+
+TEST_F(OnlineReplanning, DemandsAClearHandOnlyAfterPatienceAndWithSomethingInIt) {
+  planner.predicts_grasp = false;
+  options.obstruction_patience = 2;
+  grasp_after(7, [this](int done) {  // from the fourth action on, the can goes along in the hand
+    object(1)[0] = done >= 4 ? x.q[kJointX] + 0.03 : 5.0;
+    object(1)[1] = x.q[kJointY];
+  });
+  (void)outcome();
+  std::vector<bool> clear;
+  for (const Problem& problem : planner.problems) clear.push_back(problem.clear_hand);
+  EXPECT_THAT(clear, testing::ElementsAre(false, false, false, false, true, true, true));
 }
 
 TEST_F(OnlineReplanning, ReplansOnceTooFewControlsAreLeft) {

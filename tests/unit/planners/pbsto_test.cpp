@@ -44,7 +44,11 @@ class PbstoTest : public testing::Test {
 
   // The law of iteration i, by the definition in the headers.
   physics_pool::SamplingLaw law(const Problem& p, std::uint32_t i) const {
-    return {.sigma = options.sigma, .limit = options.limit, .seed = p.seed, .stream = p.stream + i};
+    return {.sigma = options.sigma,
+            .limit = options.limit,
+            .scales = options.scales,
+            .seed = p.seed,
+            .stream = p.stream + i};
   }
 
   BowlPool pool{kWanted};
@@ -213,6 +217,16 @@ TEST_F(PbstoTest, AsksForWhatItsOptionsSay) {
   EXPECT_EQ(batch.law.limit, options.limit);
   EXPECT_EQ(batch.objective.goal, 77);
   EXPECT_TRUE(batch.stop_on_success);
+}
+
+TEST_F(PbstoTest, CountsObstructionsOnlyWhenTheHandMustBeClear) {
+  options.objective.obstruction = 55;
+  Problem p = problem(1);
+  (void)planned(p);
+  EXPECT_EQ(pool.batches.back().objective.obstruction, 0.0);
+  p.clear_hand = true;
+  (void)planned(p);
+  EXPECT_EQ(pool.batches.back().objective.obstruction, 55);
 }
 
 TEST_F(PbstoTest, GreedyPicksTheCheapestSample) {

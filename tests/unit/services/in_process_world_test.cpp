@@ -68,7 +68,7 @@ TEST_F(InProcessWorld, RobotRefusesControlsItsPortForbids) {
 }
 
 TEST_F(InProcessWorld, ObjectsAreSeenAsTheyAreWithoutUncertainty) {
-  SimulatedObjects sut(execution, scene, Uncertainty::kNone, 1);
+  SimulatedObjects sut(execution, scene);
   const auto readings = sut.read();
   ASSERT_TRUE(readings);
   ASSERT_EQ(readings->size(), 3u);
@@ -80,11 +80,11 @@ TEST_F(InProcessWorld, ObjectsAreSeenAsTheyAreWithoutUncertainty) {
   EXPECT_THAT(carton.linear, testing::Each(0.0));
 }
 
-TEST_F(InProcessWorld, EveryMeasurementHasItsOwnNoise) {
-  SimulatedObjects sut(execution, scene, Uncertainty::kLow, 1), twin(execution, scene, Uncertainty::kLow, 1);
-  const double first = sut.read()->at(0).position[0], second = sut.read()->at(0).position[0];
-  EXPECT_NE(first, second);
-  EXPECT_EQ(twin.read()->at(0).position[0], first);
+TEST_F(InProcessWorld, OnlyTheFirstReadingHasTheErrorsOfThePlanningWorld) {
+  const physics_pool::Scene belief = physics_pool::perturb(scene, Uncertainty::kLow, 1);
+  SimulatedObjects sut(execution, belief);
+  EXPECT_EQ(sut.read()->at(0).position[0], belief.objects[0].x);
+  EXPECT_EQ(sut.read()->at(0).position[0], scene.objects[0].x);
 }
 
 TEST_F(InProcessWorld, ReadingsHoldTheWholeState) {

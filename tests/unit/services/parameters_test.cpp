@@ -42,10 +42,11 @@ TEST(Parameters, TakeEveryKey) {
   const Parameters sut = parsed(R"(
 step_duration: 0.5
 min_steps: 4
-planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], update: cost-weighted, lambda: 9, stop_losers: false}
+planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], scales: [0.5, 2], update: cost-weighted, lambda: 9, stop_losers: false}
 objective: {goal: 10, angle: 11, acceleration: 12, disturbance: 13, disturbance_rotation: 14, edge: 15, edge_rate: 16,
             edge_exponent_max: 17, edge_margin: 18, topple: 19, topple_angle: 20, drop: 21, drop_height: 22, success_cost: 23, obstruction: 24}
-control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, initial_steps: 27, straight_speed: 28,
+control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, initial_steps: 27, straight_speed: 0.28,
+          few_iterations_max: 30, obstruction_patience: 31,
           timeout: 29.5, close_hand: false}
 )");
   EXPECT_EQ(sut.planner.step_duration, 0.5);
@@ -55,6 +56,7 @@ control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, init
   EXPECT_EQ(sut.planner.rollouts, 3);
   EXPECT_THAT(sut.planner.sigma, testing::ElementsAre(1, 2, 3, 4));
   EXPECT_THAT(sut.planner.limit, testing::ElementsAre(5, 6, 7, 8));
+  EXPECT_THAT(sut.planner.scales, testing::ElementsAre(0.5, 2));
   EXPECT_EQ(sut.planner.update, planners::PbstoOptions::Update::kCostWeighted);
   EXPECT_EQ(sut.planner.lambda, 9);
   EXPECT_FALSE(sut.planner.stop_losers);
@@ -67,7 +69,9 @@ control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, init
   EXPECT_EQ(sut.control.few_iterations, 25);
   EXPECT_EQ(sut.control.deviation_threshold, 26);
   EXPECT_EQ(sut.control.initial_steps, 27);
-  EXPECT_EQ(sut.control.straight_speed, 28);
+  EXPECT_EQ(sut.control.straight_speed, 0.28);
+  EXPECT_EQ(sut.control.few_iterations_max, 30);
+  EXPECT_EQ(sut.control.obstruction_patience, 31);
   EXPECT_EQ(sut.control.timeout, std::chrono::milliseconds(29500));
   EXPECT_FALSE(sut.control.close_hand);
 }
@@ -95,6 +99,9 @@ const std::vector<Case> kCases{
     {"UnknownUpdate", "planner: {update: best}\n", {"p.yaml:1", "planner.update", "'best'", "greedy, cost-weighted"}},
     {"WrongType", "planner:\n  rollouts: many\n", {"p.yaml:2", "planner.rollouts", "'many'", "a whole number"}},
     {"ThreeSigmas", "planner: {sigma: [1, 2, 3]}\n", {"p.yaml:1", "planner.sigma", "a list of 3", "4 numbers"}},
+    {"NaNTimeout", "control: {timeout: .nan}\n", {"p.yaml", "control.timeout", "nan", "1 to"}},
+    {"NoSteps", "control: {initial_steps: 0}\n", {"p.yaml", "control.initial_steps", "got 0", "1 to"}},
+    {"NoRollouts", "planner: {rollouts: 0}\n", {"p.yaml", "planner.rollouts", "got 0", "1 to"}},
     {"NotYaml", "planner: [\n", {"p.yaml:", "not YAML"}},
     {"NotAMapping", "fast\n", {"p.yaml:1", "wanted a mapping"}},
 };

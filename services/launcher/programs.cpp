@@ -12,22 +12,15 @@ namespace jostle::services {
 namespace {
 
 // Sorted by name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kPurposes{{
-    {"bag", "inspect, cut, merge and convert recordings"},
+constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kPurposes{{
     {"bench", "measure physics, pools and planners on this machine"},
-    {"bridge", "drive a robot, or a fake one, from DDS"},
     {"coordinator", "plan and re-plan with a pool of workers"},
     {"doctor", "say what is wrong with this machine, and the remedy"},
     {"experiment", "run a study of the thesis and write its figure or table"},
-    {"perceive", "turn camera or motion capture measurements into object poses"},
-    {"play", "play a recording back"},
-    {"record", "record topics"},
     {"render", "draw states of a scene as a picture"},
     {"run", "start everything for a scene on this machine"},
     {"scene", "make, check, disturb and show scene files"},
     {"sim", "simulate the world in which actions happen"},
-    {"train-coarse", "train the learned coarse model"},
-    {"view", "watch live in a browser"},
     {"worker", "simulate rollouts for whoever asks"},
 }};
 

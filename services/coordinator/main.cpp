@@ -18,14 +18,14 @@ int main(int argc, char** argv) {
   std::string pool_kind = "dds";
   int threads = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
   dds::ParticipantOptions participant_options{.name = "jostle_coordinator"};
-  pid_t parent = 0;
+  ProcessOptions process;
   app.add_option("--pool", pool_kind, "dds: worker processes; threads: in this process")
       ->capture_default_str()->check(CLI::IsMember({"dds", "threads"}));
   app.add_option("--threads", threads, "Of the pool of threads")->capture_default_str()->check(CLI::Range(1, 1024));
-  app.add_option("--domain", participant_options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
-  app.add_option("--die-with-parent", parent, "Process id of the starter: end when it ends");
+  add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
-  die_with_parent(parent);
+  die_with_parent(process.parent);
+  participant_options.domain = process.domain;
   const StopSignal signal;
   set_up_logging("coordinator");
 

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   std::string scene_file, level = "none";
   SimulatedWorldOptions options;
   dds::ParticipantOptions participant_options{.name = "jostle_sim"};
-  pid_t parent = 0;
+  ProcessOptions process;
   app.add_option("scene", scene_file, "Scene file")->required();
   app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")
       ->capture_default_str();
@@ -24,10 +24,10 @@ int main(int argc, char** argv) {
   app.add_option("--rate", options.rate, "World seconds per second; 0: as fast as possible")
       ->capture_default_str()->check(CLI::Range(0.0, 1000.0));
   app.add_flag("--free-running", options.free_running, "Go on between actions instead of standing still");
-  app.add_option("--domain", participant_options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
-  app.add_option("--die-with-parent", parent, "Process id of the starter: end when it ends");
+  add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
-  die_with_parent(parent);
+  die_with_parent(process.parent);
+  participant_options.domain = process.domain;
   const StopSignal signal;
   set_up_logging("sim");
 

@@ -51,6 +51,11 @@ void die_with_parent(pid_t parent) {
   if (getppid() != parent) raise(SIGTERM);  // it ended before we asked
 }
 
+void add_process_options(CLI::App& app, ProcessOptions& options) {
+  app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
+  app.add_option("--die-with-parent", options.parent, "Process id of the starter: end when it ends");
+}
+
 std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv) {
   try {
     app.parse(argc, argv);

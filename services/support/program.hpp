@@ -39,6 +39,13 @@ class StopSignal {
 /// if that has happened already. `parent`: its process id; 0 does nothing.
 void die_with_parent(pid_t parent);
 
+/// What every process of a run can be told.
+struct ProcessOptions {
+  std::optional<int> domain;  ///< of DDS; else ROS_DOMAIN_ID, else 0
+  pid_t parent = 0;           ///< see die_with_parent
+};
+void add_process_options(CLI::App& app, ProcessOptions& options);
+
 /// Parses the command line. An exit code if the program is to end: after --help,
 /// or with kExitUsage after wrong arguments.
 std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv);

@@ -40,15 +40,15 @@ int main(int argc, char** argv) {
   CLI::App app("Runs rollouts for any planner in the same DDS domain until it is told to end.", "jostle worker");
   WorkerOptions options;
   dds::ParticipantOptions dds_options{.name = "jostle_worker"};
-  pid_t parent = 0;
+  ProcessOptions process;
   app.add_option("--threads", options.threads, "Rollouts at a time")
       ->capture_default_str()->check(CLI::Range(1, 1024));
-  app.add_option("--domain", dds_options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.add_option("--name", options.name, "As clients report it (default: host and process id)");
-  app.add_option("--die-with-parent", parent, "Process id of the starter: end when it ends");
+  add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
-  die_with_parent(parent);
+  die_with_parent(process.parent);
+  dds_options.domain = process.domain;
   const StopSignal signal;
   set_up_logging("worker");
   try {

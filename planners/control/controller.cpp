@@ -91,7 +91,8 @@ class Run {
     while (controls.steps() < wanted) controls.append(straight_step(plan_.states.back()));
     ++outcome_.replans;
     ++replans_in_a_row_;
-    if (auto ok = plan(controls, replan_iterations_); !ok) return ok;
+    const bool lost = plan_.cost >= setup_.objective.drop && setup_.objective.drop > 0;
+    if (auto ok = plan(lost || must_clear_hand() ? back_off() : controls, replan_iterations_); !ok) return ok;
     replan_iterations_ = plan_.grasped ? options_.few_iterations
                                        : std::min(2 * replan_iterations_, options_.few_iterations_max);
     return {};
@@ -120,8 +121,7 @@ class Run {
                     .iterations = iterations,
                     .seed = setup_.seed,
                     .stream = stream_,
-                    .clear_hand = replans_in_a_row_ > options_.obstruction_patience &&
-                                  physics_pool::count_obstructions(setup_.geometry, x_) > 0};
+                    .clear_hand = must_clear_hand()};
     auto plan_result = setup_.planner.plan(problem, deadline_, stop_);
     if (!plan_result) return plan_result.error();
     plan_ = std::move(plan_result).value();
@@ -208,6 +208,29 @@ class Run {
 
   ControlSequence straight() const {
     return straight_line(setup_.geometry, x_, options_.initial_steps, options_.step_duration);
+  }
+
+  bool must_clear_hand() const {
+    return replans_in_a_row_ > options_.obstruction_patience &&
+           physics_pool::count_obstructions(setup_.geometry, x_) > 0;
+  }
+
+  // A way out where going on cannot end well: backwards by a finger's length, so
+  // that what lodges between the fingers stays behind, then straight again.
+  ControlSequence back_off() const {
+    const int back = std::max(options_.initial_steps / 3, 1);
+    const double speed = hand::kFingerLength / (back * options_.step_duration);
+    State away = x_;
+    ControlSequence controls;
+    std::vector<double> u(kControlAxes, 0.0);
+    u[kControlX] = -speed * std::cos(x_.q[kJointRotation]);
+    u[kControlY] = -speed * std::sin(x_.q[kJointRotation]);
+    for (int t = 0; t < back; ++t) controls.append(u);
+    away.q[kJointX] += u[kControlX] * back * options_.step_duration;
+    away.q[kJointY] += u[kControlY] * back * options_.step_duration;
+    const int forth = std::max(options_.initial_steps - back, 1);
+    controls.append(straight_line(setup_.geometry, away, forth, options_.step_duration).values);
+    return controls;
   }
 
   // "Single straight step to target" (Alg. 2, line 11): towards it, turning to

@@ -315,6 +315,24 @@ TEST_F(OnlineReplanning, DemandsAClearHandOnlyAfterPatienceAndWithSomethingInIt)
   EXPECT_THAT(clear, testing::ElementsAre(false, false, false, false, true, true, true));
 }
 
+TEST_F(OnlineReplanning, BacksOffByAFingersLengthWhenThePlanDropsAnObject) {
+  planner.predicts_grasp = false;
+  planner.change = [this](Plan& plan, int) { plan.cost = setup.objective.drop; };
+  grasp_after(2);
+  (void)outcome();
+  ASSERT_EQ(planner.problems.size(), 2u);
+  const Problem& way_out = planner.problems[1];
+  double back = 0.0;
+  for (int t = 0; t < way_out.initial.steps(); ++t) back += std::min(way_out.initial.step(t)[kControlX], 0.0);
+  EXPECT_NEAR(back, -physics_pool::planar_gripper::kFingerLength, 1e-12);
+  EXPECT_EQ(way_out.initial.steps(), options.initial_steps);
+  // and forward again, to where the hand would have gone
+  State x1 = way_out.x0;
+  for (int t = 0; t < way_out.initial.steps(); ++t) x1 = tests::moved(x1, way_out.initial.step(t), 1.0);
+  EXPECT_NEAR(physics_pool::target_bearing(geometry, x1).distance,
+              physics_pool::planar_gripper::kGraspDepth, 1e-12);
+}
+
 TEST_F(OnlineReplanning, ReplansOnceTooFewControlsAreLeft) {
   const int left_when_enough = options.initial_steps - options.min_steps;
   grasp_after(left_when_enough + 2);

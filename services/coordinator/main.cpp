@@ -34,12 +34,17 @@ int main(int argc, char** argv) {
     spdlog::error("{}", participant_result.error().message);
     return kExitUsage;
   }
-  std::unique_ptr<physics_pool::Pool> pool;
-  if (pool_kind == "dds") {
-    pool = std::make_unique<RemotePool>(*participant_result);
-  } else {
-    pool = std::make_unique<physics_pool::ThreadPool>(threads);
+  try {
+    std::unique_ptr<physics_pool::Pool> pool;
+    if (pool_kind == "dds") {
+      pool = std::make_unique<RemotePool>(*participant_result);
+    } else {
+      pool = std::make_unique<physics_pool::ThreadPool>(threads);
+    }
+    Coordinator(*participant_result, *pool).run(signal.token());
+    return kExitOk;
+  } catch (const dds::SetupError& error) {
+    spdlog::error("{}", error.what());
+    return kExitBroken;
   }
-  Coordinator(*participant_result, *pool).run(signal.token());
-  return kExitOk;
 }

@@ -97,5 +97,9 @@ int main(int argc, char** argv) {
   }
   const StopSignal signal;
   if (auto ok = complete(arguments, options); !ok) return fail(ok.error(), kExitUsage);
-  return perform(options, signal.token());
+  try {
+    return perform(options, signal.token());
+  } catch (const dds::SetupError& error) {
+    return fail({Code::kUnavailable, error.what()}, kExitBroken);
+  }
 }

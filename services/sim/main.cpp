@@ -45,9 +45,13 @@ int main(int argc, char** argv) {
   auto participant_result = dds::Participant::open(participant_options);
   if (!participant_result) return fail(participant_result.error(), kExitUsage);
 
-  SimulatedWorld world(*participant_result, *world_result, options);
-  spdlog::info("world '{}' of {} objects on domain {}, uncertainty {}", scene_result->name,
-               scene_result->objects.size(), participant_result->domain(), level);
-  if (auto ok = world.run(signal.token()); !ok) return fail(ok.error(), kExitBroken);
-  return kExitOk;
+  try {
+    SimulatedWorld world(*participant_result, *world_result, options);
+    spdlog::info("world '{}' of {} objects on domain {}, uncertainty {}", scene_result->name,
+                 scene_result->objects.size(), participant_result->domain(), level);
+    if (auto ok = world.run(signal.token()); !ok) return fail(ok.error(), kExitBroken);
+    return kExitOk;
+  } catch (const dds::SetupError& error) {
+    return fail({Code::kUnavailable, error.what()}, kExitBroken);
+  }
 }

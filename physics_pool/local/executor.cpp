@@ -47,18 +47,12 @@ void Executor::submit(BatchRunPtr run, std::uint32_t sample) {
   wake_.notify_one();
 }
 
-std::size_t Executor::load() const {
-  const std::lock_guard lock(mutex_);
-  return jobs_.size() + running_;
-}
-
 void Executor::work(std::stop_token stop, int thread) {
   SimulatorCache simulators;
   std::unique_lock lock(mutex_);
   while (wake_.wait(lock, stop, [&] { return !jobs_.empty(); }) && !stop.stop_requested()) {
     Job job = std::move(jobs_.front());
     jobs_.pop_front();
-    ++running_;
     lock.unlock();
     BatchRun& run = *job.run;
     RolloutOutcome outcome{.sample = job.sample};
@@ -68,7 +62,6 @@ void Executor::work(std::stop_token stop, int thread) {
     run.on_outcome(std::move(outcome), thread);
     job = {};
     lock.lock();
-    --running_;
   }
 }
 

@@ -39,9 +39,6 @@ class Executor {
   /// Queues one sample. Thread safe.
   void submit(BatchRunPtr run, std::uint32_t sample);
 
-  /// Rollouts queued or running.
-  std::size_t load() const;
-
  private:
   struct Job {
     BatchRunPtr run;
@@ -50,10 +47,9 @@ class Executor {
 
   void work(std::stop_token stop, int thread);
 
-  mutable std::mutex mutex_;  // guards jobs_ and running_
+  std::mutex mutex_;  // guards jobs_
   std::condition_variable_any wake_;
   std::deque<Job> jobs_;
-  std::size_t running_ = 0;
   std::vector<std::jthread> threads_;
 };
 

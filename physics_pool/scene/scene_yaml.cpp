@@ -80,21 +80,15 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
-Result<Scene> parse_scene(std::string_view yaml, const std::string& origin) {
-  try {
-    const YAML::Node root = YAML::Load(std::string(yaml));
+Result<Scene> parse_scene(std::string_view text, const std::string& origin) {
+  return yaml::parse<Scene>(text, origin, [&](const YAML::Node& root) -> Result<Scene> {
     Scene scene = read(root, origin);
     const auto locate = [&](std::string_view field) {
       return fmt::format("{}:{}", origin, yaml::line_of(root, field));
     };
     if (auto ok = validate(scene, locate); !ok) return ok.error();
     return scene;
-  } catch (const Malformed& malformed) {
-    return Error{Code::kInvalidArgument, malformed.message};
-  } catch (const YAML::Exception& error) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}:{}: not YAML: {}", origin, error.mark.line + 1, error.msg)};
-  }
+  });
 }
 
 Result<Scene> load_scene(const std::filesystem::path& file) {

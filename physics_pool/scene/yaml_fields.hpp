@@ -15,9 +15,11 @@
 #include <type_traits>
 #include <utility>
 
+#include "idl/types/result.hpp"
+
 namespace jostle::yaml {
 
-/// Thrown by Fields; whoever parses a file turns it into an Error.
+/// Thrown by Fields; parse() turns it into an Error.
 struct Malformed {
   std::string message;
 };
@@ -172,5 +174,19 @@ class Fields {
   const std::string& origin_;
   std::set<std::string> known_;
 };
+
+/// What `read` makes of the text's root node: a Result<T>. Whatever is malformed
+/// becomes an Error of kInvalidArgument that names file and line.
+template <class T, class Read>
+Result<T> parse(std::string_view text, const std::string& origin, Read read) {
+  try {
+    return read(YAML::Load(std::string(text)));
+  } catch (const Malformed& malformed) {
+    return Error{Code::kInvalidArgument, malformed.message};
+  } catch (const YAML::Exception& error) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}:{}: not YAML: {}", origin, error.mark.line + 1, error.msg)};
+  }
+}
 
 }  // namespace jostle::yaml

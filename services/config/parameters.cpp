@@ -103,18 +103,13 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
 }  // namespace
 
 Result<Parameters> parse_parameters(std::string_view text, const std::string& origin) {
-  try {
+  return yaml::parse<Parameters>(text, origin, [&](const YAML::Node& root) -> Result<Parameters> {
     double timeout = std::chrono::duration<double>(ControlOptions{}.timeout).count();
-    Parameters parameters = read(YAML::Load(std::string(text)), origin, timeout);
+    Parameters parameters = read(root, origin, timeout);
     if (auto ok = check(parameters, timeout, origin); !ok) return ok.error();
     parameters.control.timeout = std::chrono::milliseconds(std::llround(timeout * 1e3));
     return parameters;
-  } catch (const yaml::Malformed& malformed) {
-    return Error{Code::kInvalidArgument, malformed.message};
-  } catch (const YAML::Exception& error) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}:{}: not YAML: {}", origin, error.mark.line + 1, error.msg)};
-  }
+  });
 }
 
 Result<Parameters> load_parameters(const std::filesystem::path& file) {

@@ -142,9 +142,9 @@ Result<GraspingStudy> load_grasping_study(const std::string& name) {
     return Error{Code::kNotFound, fmt::format("experiment: got '{}', wanted one of `jostle experiment "
                                               "list` ({})", name, text_result.error().message)};
   }
-  try {
+  return yaml::parse<GraspingStudy>(*text_result, file.string(), [&](const YAML::Node& root) -> Result<GraspingStudy> {
     std::string parameters_file;
-    GraspingStudy study = read(YAML::Load(*text_result), file.string(), parameters_file);
+    GraspingStudy study = read(root, file.string(), parameters_file);
     auto parameters_result = load_parameters(file.parent_path() / parameters_file);
     if (!parameters_result) return parameters_result.error();
     study.parameters = *parameters_result;
@@ -158,11 +158,7 @@ Result<GraspingStudy> load_grasping_study(const std::string& name) {
       }
     }
     return study;
-  } catch (const yaml::Malformed& malformed) {
-    return Error{Code::kInvalidArgument, malformed.message};
-  } catch (const YAML::Exception& error) {
-    return Error{Code::kInvalidArgument, fmt::format("{}: not YAML: {}", file.string(), error.what())};
-  }
+  });
 }
 
 std::vector<GraspingRun> run_study(const GraspingStudy& study, int jobs,

@@ -16,6 +16,9 @@ struct Qos {
 /// Commands and requests, each of which matters. The depth holds a burst to one
 /// peer, so that a slow peer is never the reason to block the writer.
 inline constexpr Qos kTask{.depth = 512};
+/// Answers to requests: an asker whose reader the answerer has not found yet
+/// gets them when it is found. Who asked sorts out what is its own.
+inline constexpr Qos kAnswer{.latched = true, .depth = 16};
 /// The last word on something, for whoever comes later.
 inline constexpr Qos kLatched{.latched = true, .depth = 1};
 /// Newest sample wins; a lost one is not worth repeating.

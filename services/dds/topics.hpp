@@ -23,7 +23,7 @@ inline const Topic<msg::RobotStatus> kRobotStatus{"rt/robot/status", dds::kState
 inline const Topic<msg::Goal> kTaskGoal{"rt/task/goal", dds::kTask};
 inline const Topic<msg::Cancel> kTaskCancel{"rt/task/cancel", dds::kTask};
 inline const Topic<msg::Feedback> kTaskFeedback{"rt/task/feedback", dds::kState};
-inline const Topic<msg::GoalResult> kTaskResult{"rt/task/result", dds::kTask};
+inline const Topic<msg::GoalResult> kTaskResult{"rt/task/result", dds::kAnswer};
 
 inline const Topic<msg::WorkerHeartbeat> kPoolWorker{"rt/pool/worker", dds::kState};
 inline const Topic<msg::WorldDescription> kPoolWorld{"rt/pool/world", dds::kCatalogue};

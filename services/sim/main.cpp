@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "services/support/domain_claim.hpp"
 #include "services/support/program.hpp"
 #include "services/world_link/simulated_world.hpp"
 
@@ -44,6 +45,9 @@ int main(int argc, char** argv) {
   if (!world_result) return fail(world_result.error(), kExitUsage);
   auto participant_result = dds::Participant::open(participant_options);
   if (!participant_result) return fail(participant_result.error(), kExitUsage);
+  // Before it says a word.
+  const auto claim_result = DomainClaim::take("simulated world", participant_result->domain(), std::chrono::seconds(1));
+  if (!claim_result) return fail(claim_result.error(), kExitBroken);
 
   try {
     SimulatedWorld world(*participant_result, *world_result, options);

@@ -1,0 +1,55 @@
+#include "services/support/domain_claim.hpp"
+
+#include <fmt/format.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <thread>
+#include <utility>
+
+namespace jostle::services {
+namespace {
+
+constexpr std::chrono::milliseconds kRetry{20};
+
+}  // namespace
+
+Result<DomainClaim> DomainClaim::take(const std::string& role, int domain, std::chrono::milliseconds patience) {
+  const int handle = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (handle < 0) return Error{Code::kUnavailable, fmt::format("domain {}: {}", domain, std::strerror(errno))};
+  DomainClaim claim(handle);
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  // A leading zero: a name in the kernel, not a file.
+  const std::string name = fmt::format("jostle/{}/{}", domain, role);
+  name.copy(address.sun_path + 1, sizeof(address.sun_path) - 1);
+  const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (bind(handle, reinterpret_cast<const sockaddr*>(&address), length) != 0) {
+    const int problem = errno;
+    if (problem != EADDRINUSE || std::chrono::steady_clock::now() >= deadline) {
+      return Error{Code::kUnavailable,
+                   problem == EADDRINUSE
+                       ? fmt::format("domain {}: got another {} on this machine, wanted none; "
+                                     "set ROS_DOMAIN_ID to a free one", domain, role)
+                       : fmt::format("domain {}: {}", domain, std::strerror(problem))};
+    }
+    std::this_thread::sleep_for(kRetry);
+  }
+  return claim;
+}
+
+DomainClaim::DomainClaim(DomainClaim&& other) noexcept : socket_(std::exchange(other.socket_, -1)) {}
+
+DomainClaim& DomainClaim::operator=(DomainClaim&& other) noexcept {
+  std::swap(socket_, other.socket_);
+  return *this;
+}
+
+DomainClaim::~DomainClaim() {
+  if (socket_ >= 0) close(socket_);
+}
+
+}  // namespace jostle::services

@@ -1,0 +1,33 @@
+#pragma once
+/// \file
+/// Two worlds on one domain would speak into each other's topics.
+
+#include <chrono>
+#include <string>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::services {
+
+/// A role that only one process of a machine may have on a DDS domain. Held
+/// until it is destroyed or the process ends, however it ends.
+///
+/// A bound socket without a file: there is nothing to clean up, and it reaches
+/// exactly as far as loopback traffic does, the network namespace.
+class DomainClaim {
+ public:
+  /// Waits up to `patience` for a predecessor that is just ending.
+  /// Error kUnavailable if another process has the role.
+  static Result<DomainClaim> take(const std::string& role, int domain, std::chrono::milliseconds patience);
+
+  DomainClaim(DomainClaim&& other) noexcept;
+  DomainClaim& operator=(DomainClaim&& other) noexcept;
+  ~DomainClaim();
+
+ private:
+  explicit DomainClaim(int socket) : socket_(socket) {}
+
+  int socket_;
+};
+
+}  // namespace jostle::services

@@ -98,14 +98,19 @@ msg::BatchDescription to_wire(const RolloutBatch& batch) {
   wire.scales(batch.law.scales);
   wire.seed(batch.law.seed);
   wire.stream(batch.law.stream);
+  wire.persistence(batch.law.persistence);
+  wire.draws(batch.law.draws);
   wire.first_sample(batch.first_sample);
   wire.samples(batch.samples);
   wire.objective(to_wire(batch.objective));
   wire.incumbent(batch.incumbent);
   wire.stop_losers(batch.stop_losers);
+  wire.stop_hopeless(batch.stop_hopeless);
   wire.stop_on_success(batch.stop_on_success);
   wire.min_steps(batch.min_steps);
   wire.want_all_trajectories(batch.want_all_trajectories);
+  wire.freeze(batch.fidelity.freeze);
+  wire.time_step(batch.fidelity.time_step);
   wire.wait(batch.wait ? batch.wait->count() : kSimulate);
   return wire;
 }
@@ -121,15 +126,19 @@ RolloutBatch from_wire(const msg::BatchDescription& wire) {
                .limit = wire.limit(),
                .scales = wire.scales(),
                .seed = wire.seed(),
-               .stream = wire.stream()};
+               .stream = wire.stream(),
+               .persistence = wire.persistence(),
+               .draws = wire.draws()};
   batch.first_sample = wire.first_sample();
   batch.samples = wire.samples();
   batch.objective = from_wire(wire.objective());
   batch.incumbent = wire.incumbent();
   batch.stop_losers = wire.stop_losers();
+  batch.stop_hopeless = wire.stop_hopeless();
   batch.stop_on_success = wire.stop_on_success();
   batch.min_steps = wire.min_steps();
   batch.want_all_trajectories = wire.want_all_trajectories();
+  batch.fidelity = {.freeze = wire.freeze(), .time_step = wire.time_step()};
   if (wire.wait() != kSimulate) batch.wait = std::chrono::nanoseconds(wire.wait());
   return batch;
 }
@@ -141,6 +150,7 @@ msg::TaskResult to_wire(const RolloutOutcome& outcome) {
   wire.cost(outcome.cost);
   wire.steps(outcome.steps);
   wire.engine_steps(outcome.engine_steps);
+  wire.thawed(outcome.thawed);
   wire.grasped(outcome.grasped);
   wire.step_costs(outcome.step_costs);
   wire.reason(outcome.reason);
@@ -176,6 +186,7 @@ Result<RolloutOutcome> from_wire(const msg::TaskResult& wire) {
                         .cost = wire.cost(),
                         .steps = wire.steps(),
                         .engine_steps = wire.engine_steps(),
+                        .thawed = wire.thawed(),
                         .grasped = wire.grasped(),
                         .step_costs = wire.step_costs(),
                         .trajectory = std::move(trajectory_result).value(),

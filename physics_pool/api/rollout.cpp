@@ -47,16 +47,21 @@ Result<void> check_weights(const Objective& o) {
 ControlSequence sample_controls(const ControlSequence& nominal, const SamplingLaw& law,
                                 std::uint32_t sample) {
   ControlSequence controls = nominal;
-  const double scale = law.scales[sample % law.scales.size()];
+  const std::uint32_t draw = law.draws.empty() ? sample : law.draws[sample];
+  const double scale = law.scales[draw % law.scales.size()];
+  const double fresh = std::sqrt(1 - law.persistence * law.persistence);
+  std::vector<double> noise(static_cast<std::size_t>(nominal.nu), 0.0);
   for (int t = 0; t < nominal.steps(); ++t) {
     const std::span<double> u = controls.step(t);
+    const std::span<const double> sigma = law.sigma_of(t);
     for (std::size_t i = 0; i < u.size(); ++i) {
-      if (law.sigma[i] > 0) {
-        u[i] += scale * law.sigma[i] *
-                standard_normal(law.seed, {.stream = law.stream,
-                                           .sample = sample,
-                                           .step = static_cast<std::uint32_t>(t),
-                                           .axis = static_cast<std::uint32_t>(i)});
+      if (sigma[i] > 0) {
+        const double z = standard_normal(law.seed, {.stream = law.stream,
+                                                    .sample = draw,
+                                                    .step = static_cast<std::uint32_t>(t),
+                                                    .axis = static_cast<std::uint32_t>(i)});
+        noise[i] = law.persistence > 0 && t > 0 ? law.persistence * noise[i] + fresh * z : z;
+        u[i] += scale * sigma[i] * noise[i];
       }
       u[i] = std::clamp(u[i], -law.limit[i], law.limit[i]);
     }
@@ -110,15 +115,31 @@ Result<void> validate(const RolloutBatch& batch) {
     return wrong("wait", fmt::format("{} ns", batch.wait->count()), "0 to 10 s");
   }
   if (auto ok = check_size("u_before", batch.u_before.size(), nu); !ok) return ok;
-  if (auto ok = check_size("law.sigma", batch.law.sigma.size(), nu); !ok) return ok;
+  if (batch.law.sigma.size() != batch.nominal.values.size()) {
+    if (auto ok = check_size("law.sigma", batch.law.sigma.size(), nu); !ok) return ok;
+  }
   if (auto ok = check_size("law.limit", batch.law.limit.size(), nu); !ok) return ok;
-  for (std::size_t i = 0; i < nu; ++i) {
+  for (std::size_t i = 0; i < batch.law.sigma.size(); ++i) {
     if (!(batch.law.sigma[i] >= 0 && std::isfinite(batch.law.sigma[i]))) {
       return wrong(fmt::format("law.sigma[{}]", i), fmt::format("{}", batch.law.sigma[i]), "a finite number >= 0");
     }
+  }
+  for (std::size_t i = 0; i < nu; ++i) {
     if (!(batch.law.limit[i] > 0)) {
       return wrong(fmt::format("law.limit[{}]", i), fmt::format("{}", batch.law.limit[i]), "> 0");
     }
+  }
+  if (!(batch.law.persistence >= 0 && batch.law.persistence < 1)) {
+    return wrong("law.persistence", fmt::format("{}", batch.law.persistence), "at least 0, less than 1");
+  }
+  const std::size_t last = std::size_t{batch.first_sample} + batch.samples;
+  if (!batch.law.draws.empty() && batch.law.draws.size() < last) {
+    return wrong("law.draws", fmt::format("{} values", batch.law.draws.size()),
+                 fmt::format("none, or one for each of {} samples", last));
+  }
+  if (!(batch.fidelity.time_step >= 0 && batch.fidelity.time_step <= kMaxTimeStep)) {
+    return wrong("fidelity.time_step", fmt::format("{} s", batch.fidelity.time_step),
+                 fmt::format("0 for the world's own, at most {} s", kMaxTimeStep));
   }
   if (batch.law.scales.empty() || batch.law.scales.size() > kMaxScales) {
     return wrong("law.scales", fmt::format("{} values", batch.law.scales.size()),
@@ -143,10 +164,17 @@ Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, doub
   if (batch.nominal.nu != layout.nu) {
     return wrong("nominal.nu", std::to_string(batch.nominal.nu), std::to_string(layout.nu));
   }
+  if (batch.fidelity.time_step > 0) {
+    if (batch.fidelity.time_step < time_step) {
+      return wrong("fidelity.time_step", fmt::format("{} s", batch.fidelity.time_step),
+                   fmt::format("0, or the world's {} s or more", time_step));
+    }
+    time_step = batch.fidelity.time_step;
+  }
   const double steps = batch.step_duration / time_step;
   if (steps < 0.5 || std::abs(steps - std::round(steps)) > 1e-6 * steps) {
     return wrong("step_duration", fmt::format("{} s", batch.step_duration),
-                 fmt::format("a multiple of the world's time step, {} s", time_step));
+                 fmt::format("a multiple of the time step, {} s", time_step));
   }
   return {};
 }

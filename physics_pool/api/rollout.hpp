@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,18 +21,44 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// How sample k's controls follow from the nominal ones:
 ///
-///   u[k][t][i] = clamp(U[t][i] + scales[k mod m]·sigma[i]·z, -limit[i], +limit[i])
-///   z = standard normal, a pure function of (seed, stream, k, t, i)
+///   u[k][t][i] = clamp(U[t][i] + scales[d mod m]·sigma[t][i]·e[t][i], -limit[i], +limit[i])
+///   e[t][i] = persistence·e[t-1][i] + sqrt(1 - persistence^2)·z,   e[0][i] = z
+///   z = standard normal, a pure function of (seed, stream, d, t, i)
+///   d = draws[k], or k without a list
 ///
 /// Any worker can make any sample; sigma = 0 gives the clamped nominal controls.
 struct SamplingLaw {
-  std::vector<double> sigma;  ///< [nu] standard deviations, m/s and rad/s, >= 0
+  /// [nu], the same for all steps, or [n][nu] row-major: standard deviations,
+  /// m/s and rad/s, >= 0.
+  std::vector<double> sigma;
   std::vector<double> limit;  ///< [nu] largest magnitudes, m/s and rad/s, > 0
   /// [m] factors of sigma, dealt out to the samples in turn, >= 0: a batch can
   /// refine and explore at once.
   std::vector<double> scales{1.0};
   std::uint64_t seed = 0;
   std::uint32_t stream = 0;  ///< the planner's iteration: same seed, fresh noise
+  double persistence = 0.0;  ///< in [0, 1): of the noise from step to step; 0 is white
+  /// Empty, or the draw that each sample stands for: a batch of a few picked from
+  /// the draws of a larger one.
+  std::vector<std::uint32_t> draws;
+
+  /// Of step t.
+  std::span<const double> sigma_of(int t) const {
+    const std::size_t nu = limit.size(), row = sigma.size() > nu ? static_cast<std::size_t>(t) * nu : 0;
+    return {sigma.data() + row, nu};
+  }
+};
+
+/// How much physics a rollout is worth. The defaults are the fine model F.
+struct Fidelity {
+  /// Objects that stand still have no freedom until something touches them. The
+  /// touch is found before it has any effect, and the object is free from there on.
+  bool freeze = false;
+  /// Engine step, s; 0 is the world's own. Longer is cheaper and less exact: for
+  /// screening. Drives are softened where they would be unstable.
+  double time_step = 0.0;
+
+  bool operator==(const Fidelity&) const = default;
 };
 
 /// K rollouts of n control steps from one state.
@@ -48,9 +75,12 @@ struct RolloutBatch {
   /// Cost to beat: a rollout that can no longer get below it, nor succeed, stops.
   double incumbent = kInfinity;
   bool stop_losers = true;       ///< off: every rollout runs to its end
+  /// Judge losers by what is still to come as well (`objective/bound.hpp`).
+  bool stop_hopeless = false;
   bool stop_on_success = false;  ///< Alg. 1, lines 8-9
   int min_steps = 0;             ///< n_min: success counts from this control step (0-based) on
   bool want_all_trajectories = false;
+  Fidelity fidelity;
   /// Scheduling studies only: wait this long per rollout and simulate nothing.
   std::optional<std::chrono::nanoseconds> wait;
 };
@@ -70,6 +100,7 @@ struct RolloutOutcome {
   double cost = kInfinity;         ///< total of Eq. 3.2; +inf unless completed or succeeded
   std::uint32_t steps = 0;         ///< control steps whose cost is known
   std::uint64_t engine_steps = 0;  ///< physics steps spent
+  std::uint32_t thawed = 0;        ///< times a frozen object was touched and set free
   bool grasped = false;            ///< target in the pre-grasp region at the last state
   std::vector<double> step_costs;  ///< [steps]; the last one carries the goal cost
   Trajectory trajectory;           ///< [steps + 1], or empty if not asked for
@@ -102,6 +133,7 @@ Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, doub
 inline constexpr std::uint32_t kMaxSamples = 1'000'000;
 inline constexpr int kMaxSteps = 10'000;
 inline constexpr double kMaxStepDuration = 60.0;         // seconds
+inline constexpr double kMaxTimeStep = 0.02;             // seconds; beyond it nothing is stable
 inline constexpr std::size_t kMaxStateSize = 100'000;    // numbers in q or v
 inline constexpr std::size_t kMaxScales = 1'000;
 inline constexpr std::chrono::seconds kMaxWait{10};

@@ -235,5 +235,43 @@ TEST(SampleControls, DoesNotDependOnTheNumberOfStepsThatFollow) {
   EXPECT_EQ(sample_controls(one, law(), 1), sample);
 }
 
+TEST(SampleControls, TakesARowOfSigmaPerStep) {
+  SamplingLaw rows = law();
+  rows.sigma = {0.1, 0.2, 0.0, 0.3, 0.0, 0.4};
+  const ControlSequence nominal{.nu = 3, .values = {0, 0, 0, 0, 0, 0}};
+  const ControlSequence sample = sample_controls(nominal, rows, 9);
+  for (std::uint32_t t = 0; t < 2; ++t) {
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const double z = standard_normal(77, {.stream = 3, .sample = 9, .step = t, .axis = i});
+      EXPECT_EQ(sample.step(int(t))[i], rows.sigma[3 * t + i] * z);
+    }
+  }
+}
+
+TEST(SampleControls, DrawsStandForSamplesOfALargerBatch) {
+  SamplingLaw picked = law();
+  picked.scales = {1.0, 0.5, 0.25};
+  const SamplingLaw all = picked;
+  picked.draws = {4, 17};
+  const ControlSequence nominal{.nu = 3, .values = {1, 2, 3, 4, 5, 6}};
+  EXPECT_EQ(sample_controls(nominal, picked, 0), sample_controls(nominal, all, 4));
+  EXPECT_EQ(sample_controls(nominal, picked, 1), sample_controls(nominal, all, 17));
+}
+
+// e[t] = p e[t-1] + sqrt(1-p^2) z keeps variance 1 and correlates neighbours by p.
+TEST(SampleControls, PersistentNoiseKeepsItsVarianceAndCorrelatesNeighbours) {
+  SamplingLaw persistent{.sigma = {1.0}, .limit = {1e9}, .seed = 5, .persistence = 0.6};
+  const ControlSequence nominal{.nu = 1, .values = std::vector<double>(4, 0.0)};
+  constexpr int kSamples = 20000;
+  double variance = 0.0, product = 0.0;
+  for (std::uint32_t k = 0; k < kSamples; ++k) {
+    const ControlSequence noise = sample_controls(nominal, persistent, k);
+    variance += noise.values[3] * noise.values[3];
+    product += noise.values[2] * noise.values[3];
+  }
+  EXPECT_NEAR(variance / kSamples, 1.0, 0.05);  // 5 sigma: sqrt(2/20000) = 0.01
+  EXPECT_NEAR(product / kSamples, 0.6, 0.05);
+}
+
 }  // namespace
 }  // namespace jostle::physics_pool

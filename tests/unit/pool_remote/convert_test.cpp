@@ -26,7 +26,8 @@ RolloutBatch odd_batch() {
   batch.nominal = {.nu = 4, .values = kAwkward};
   batch.u_before = {1, 2, 3, -0.0};
   batch.step_duration = 0.7;
-  batch.law = {.sigma = {1, 2}, .limit = {3, 4}, .scales = {5, 6, 7}, .seed = UINT64_MAX - 1, .stream = 17};
+  batch.law = {.sigma = {1, 2}, .limit = {3, 4}, .scales = {5, 6, 7}, .seed = UINT64_MAX - 1, .stream = 17,
+               .persistence = 0.3, .draws = {9, UINT32_MAX}};
   batch.first_sample = UINT32_MAX - 5;
   batch.samples = 5;
   batch.objective = {.goal = 1, .angle = 2, .acceleration = 3, .disturbance = 4,
@@ -35,9 +36,11 @@ RolloutBatch odd_batch() {
                      .drop_height = 13, .obstruction = 15, .success_cost = 14};
   batch.incumbent = 0.1;
   batch.stop_losers = false;
+  batch.stop_hopeless = true;
   batch.stop_on_success = true;
   batch.min_steps = 9;
   batch.want_all_trajectories = true;
+  batch.fidelity = {.freeze = true, .time_step = 0.008};
   batch.wait = std::chrono::nanoseconds(123456789);
   return batch;
 }
@@ -58,6 +61,8 @@ TEST(ConvertBatch, SurvivesTheWire) {
   EXPECT_EQ(got.law.scales, wanted.law.scales);
   EXPECT_EQ(got.law.seed, wanted.law.seed);
   EXPECT_EQ(got.law.stream, wanted.law.stream);
+  EXPECT_EQ(got.law.persistence, wanted.law.persistence);
+  EXPECT_EQ(got.law.draws, wanted.law.draws);
   EXPECT_EQ(got.first_sample, wanted.first_sample);
   EXPECT_EQ(got.samples, wanted.samples);
   EXPECT_EQ(std::memcmp(&got.objective, &wanted.objective, sizeof wanted.objective), 0);
@@ -66,6 +71,8 @@ TEST(ConvertBatch, SurvivesTheWire) {
   EXPECT_EQ(got.stop_on_success, wanted.stop_on_success);
   EXPECT_EQ(got.min_steps, wanted.min_steps);
   EXPECT_EQ(got.want_all_trajectories, wanted.want_all_trajectories);
+  EXPECT_EQ(got.stop_hopeless, wanted.stop_hopeless);
+  EXPECT_EQ(got.fidelity, wanted.fidelity);
   EXPECT_EQ(got.wait, wanted.wait);
 }
 
@@ -81,6 +88,7 @@ RolloutOutcome odd_outcome() {
           .cost = 0.1,
           .steps = 2,
           .engine_steps = std::uint64_t{1} << 40,
+          .thawed = 3,
           .grasped = true,
           .step_costs = {0.1, -0.0},
           .trajectory = {{.q = {1, 2, 3}, .v = {4}}, {.q = {5, 6, -0.0}, .v = {kInfinity}}},
@@ -97,6 +105,7 @@ TEST(ConvertOutcome, SurvivesTheWire) {
   EXPECT_EQ(got_result->cost, wanted.cost);
   EXPECT_EQ(got_result->steps, wanted.steps);
   EXPECT_EQ(got_result->engine_steps, wanted.engine_steps);
+  EXPECT_EQ(got_result->thawed, wanted.thawed);
   EXPECT_EQ(got_result->grasped, wanted.grasped);
   EXPECT_EQ(hash_of(got_result->step_costs), hash_of(wanted.step_costs));
   EXPECT_EQ(got_result->trajectory, wanted.trajectory);

@@ -37,8 +37,6 @@ class Pbsto final : public Planner {
   Result<Plan> plan(const Problem& problem, TimePoint deadline, std::stop_token stop = {}) override;
 
  private:
-  struct Run;
-
   physics_pool::Pool& pool_;
   PbstoOptions options_;
   OnProgress on_progress_;

@@ -1,0 +1,132 @@
+#include "planners/search/search.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace jostle::planners {
+
+using physics_pool::BatchReply;
+using physics_pool::End;
+using physics_pool::RolloutBatch;
+using physics_pool::RolloutOutcome;
+
+Search::Search(physics_pool::Pool& pool, const Problem& problem, RolloutBatch pattern, TimePoint deadline,
+               std::stop_token stop, const OnProgress& on_progress)
+    : pool_(pool),
+      problem_(problem),
+      pattern_(std::move(pattern)),
+      deadline_(deadline),
+      stop_(std::move(stop)),
+      on_progress_(on_progress) {
+  pattern_.world = problem.world;
+  pattern_.x0 = problem.x0;
+  pattern_.u_before.assign(static_cast<std::size_t>(problem.initial.nu), 0.0);
+  pattern_.law.seed = problem.seed;
+  if (!problem.clear_hand) pattern_.objective.obstruction = 0.0;
+  pattern_.stop_on_success = true;
+  best_.controls = problem.initial;
+  best_.states = {problem.x0};
+}
+
+RolloutBatch Search::around(const ControlSequence& nominal) const {
+  RolloutBatch batch = pattern_;
+  batch.nominal = nominal;
+  batch.law.stream = problem_.stream + static_cast<std::uint32_t>(best_.iterations);
+  batch.incumbent = best_.cost;
+  return batch;
+}
+
+Result<BatchReply> Search::run(const RolloutBatch& batch) {
+  auto reply_result = pool_.run(batch, deadline_, stop_);
+  if (!reply_result) return reply_result;
+  best_.rollouts += batch.samples;
+  for (const RolloutOutcome& outcome : reply_result->outcomes) {
+    if (outcome.end == End::kDiverged) divergence_ = outcome.reason;
+  }
+  return reply_result;
+}
+
+void Search::adopt(const RolloutBatch& batch, const BatchReply& reply) {
+  const RolloutOutcome* winner = winner_of(reply);
+  if (!winner) return;
+  best_.controls = physics_pool::sample_controls(batch.nominal, batch.law, winner->sample);
+  best_.controls.truncate(static_cast<int>(winner->steps));  // a success may come early
+  best_.states = winner->trajectory;
+  best_.cost = winner->cost;
+  best_.grasped = winner->grasped && winner->cost <= pattern_.objective.success_cost;
+}
+
+Result<void> Search::consider(const ControlSequence& controls) {
+  RolloutBatch one = around(controls);
+  std::ranges::fill(one.law.sigma, 0.0);
+  auto reply_result = run(one);
+  if (!reply_result) return reply_result.error();
+  adopt(one, *reply_result);
+  return {};
+}
+
+Result<Plan> Search::until_done(const std::function<Result<void>()>& improve) {
+  if (auto ok = consider(problem_.initial); !ok) return ok.error();
+  report();
+  while (best_.iterations < problem_.iterations && !best_.grasped) {
+    if (auto ok = improve(); !ok) return ok.error();
+    ++best_.iterations;
+    report();
+  }
+  if (best_.cost == physics_pool::kInfinity) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("x0: all {} rollouts from it diverged ({}), wanted a state that physics "
+                             "can start from", best_.rollouts, divergence_)};
+  }
+  return std::move(best_);
+}
+
+void Search::report() const {
+  if (!on_progress_) return;
+  on_progress_({.iteration = best_.iterations,
+                .cost = best_.cost,
+                .grasped = best_.grasped,
+                .rollouts = best_.rollouts,
+                .final_state = best_.states.empty() ? nullptr : &best_.states.back()});
+}
+
+const RolloutOutcome* winner_of(const BatchReply& reply) {
+  return reply.winner < 0 ? nullptr : &reply.outcomes[static_cast<std::size_t>(reply.winner)];
+}
+
+bool succeeded(const BatchReply& reply) {
+  const RolloutOutcome* winner = winner_of(reply);
+  return winner && winner->end == End::kSucceeded;
+}
+
+std::vector<Scored> completed(const RolloutBatch& batch, const BatchReply& reply) {
+  std::vector<Scored> samples;
+  for (const RolloutOutcome& outcome : reply.outcomes) {
+    if (outcome.end != End::kCompleted) continue;
+    samples.push_back({physics_pool::sample_controls(batch.nominal, batch.law, outcome.sample), &outcome});
+  }
+  return samples;
+}
+
+std::vector<double> exponential_weights(const std::vector<double>& costs, double lambda) {
+  std::vector<double> weights = costs;
+  const double least = costs.empty() ? 0.0 : *std::ranges::min_element(costs);
+  for (double& weight : weights) weight = std::exp(-(weight - least) / lambda);
+  return weights;
+}
+
+void average_step(std::span<const Scored> samples, std::span<const double> weights, int t,
+                  ControlSequence& mean) {
+  const std::span<double> u = mean.step(t);
+  std::ranges::fill(u, 0.0);
+  double total = 0.0;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    total += weights[k];
+    for (std::size_t i = 0; i < u.size(); ++i) u[i] += weights[k] * samples[k].controls.step(t)[i];
+  }
+  for (double& value : u) value /= total;
+}
+
+}  // namespace jostle::planners

@@ -1,0 +1,79 @@
+#pragma once
+/// \file
+/// What every planner that samples around a candidate does alike: score,
+/// keep the best, report, end.
+
+#include <functional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "planners/api/planner.hpp"
+
+namespace jostle::planners {
+
+/// One call of Planner::plan. The problem must outlive it.
+class Search {
+ public:
+  /// `pattern`: what all batches have in common, such as the law and the
+  /// objective. World, state and seed are the problem's, and a success ends a batch.
+  Search(physics_pool::Pool& pool, const Problem& problem, physics_pool::RolloutBatch pattern,
+         TimePoint deadline, std::stop_token stop, const OnProgress& on_progress);
+
+  /// Cheapest sequence so far; its controls are the initial ones until there is one.
+  const Plan& best() const { return best_; }
+
+  /// A batch of one sample, with the noise stream of this iteration and the
+  /// best cost as the one to beat.
+  physics_pool::RolloutBatch around(const ControlSequence& nominal) const;
+
+  /// Runs a batch and counts its rollouts.
+  Result<physics_pool::BatchReply> run(const physics_pool::RolloutBatch& batch);
+
+  /// Keeps the winner of a batch, if it has one.
+  void adopt(const physics_pool::RolloutBatch& batch, const physics_pool::BatchReply& reply);
+
+  /// Runs one sequence as it is, and keeps it if it is better.
+  Result<void> consider(const ControlSequence& controls);
+
+  /// Scores the initial sequence, then improves it until a success or the last
+  /// iteration; tells on_progress after each.
+  /// Errors   those of `improve`, and of Planner::plan.
+  Result<Plan> until_done(const std::function<Result<void>()>& improve);
+
+ private:
+  void report() const;
+
+  physics_pool::Pool& pool_;
+  const Problem& problem_;
+  physics_pool::RolloutBatch pattern_;
+  const TimePoint deadline_;
+  const std::stop_token stop_;
+  const OnProgress& on_progress_;
+  Plan best_;
+  std::string divergence_;  // reason of the newest rollout that diverged
+};
+
+/// The reply's winner, or nullptr.
+const physics_pool::RolloutOutcome* winner_of(const physics_pool::BatchReply& reply);
+bool succeeded(const physics_pool::BatchReply& reply);
+
+/// A sample that ran to its end.
+struct Scored {
+  ControlSequence controls;
+  const physics_pool::RolloutOutcome* outcome = nullptr;  ///< of the reply
+};
+
+/// In sample order.
+std::vector<Scored> completed(const physics_pool::RolloutBatch& batch, const physics_pool::BatchReply& reply);
+
+/// exp(-(C_k - min C)/lambda). Taking the smallest cost off changes no ratio and
+/// keeps the largest weight at 1.
+std::vector<double> exponential_weights(const std::vector<double>& costs, double lambda);
+
+/// Sets step t of `mean` to the weighted mean of the samples' step t.
+void average_step(std::span<const Scored> samples, std::span<const double> weights, int t,
+                  ControlSequence& mean);
+
+}  // namespace jostle::planners

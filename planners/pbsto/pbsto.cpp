@@ -1,7 +1,5 @@
 #include "planners/pbsto/pbsto.hpp"
 
-#include <algorithm>
-
 #include "planners/search/search.hpp"
 
 namespace jostle::planners {
@@ -18,9 +16,9 @@ ControlSequence weighted_mean(const RolloutBatch& noisy, const BatchReply& reply
   if (samples.empty()) return mean;
   std::vector<double> costs(samples.size());
   for (int t = 0; t < mean.steps(); ++t) {
-    std::ranges::transform(samples, costs.begin(), [t](const Scored& sample) {
-      return sample.outcome->step_costs[static_cast<std::size_t>(t)];
-    });
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      costs[k] = samples[k].step_costs[static_cast<std::size_t>(t)];
+    }
     average_step(samples, exponential_weights(costs, lambda), t, mean);
   }
   return mean;

@@ -105,7 +105,9 @@ std::vector<Scored> completed(const RolloutBatch& batch, const BatchReply& reply
   std::vector<Scored> samples;
   for (const RolloutOutcome& outcome : reply.outcomes) {
     if (outcome.end != End::kCompleted) continue;
-    samples.push_back({physics_pool::sample_controls(batch.nominal, batch.law, outcome.sample), &outcome});
+    samples.push_back({.controls = physics_pool::sample_controls(batch.nominal, batch.law, outcome.sample),
+                       .cost = outcome.cost,
+                       .step_costs = outcome.step_costs});
   }
   return samples;
 }

@@ -62,7 +62,8 @@ bool succeeded(const physics_pool::BatchReply& reply);
 /// A sample that ran to its end.
 struct Scored {
   ControlSequence controls;
-  const physics_pool::RolloutOutcome* outcome = nullptr;  ///< of the reply
+  double cost = 0.0;
+  std::vector<double> step_costs;  ///< [n]
 };
 
 /// In sample order.

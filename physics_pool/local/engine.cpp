@@ -1,7 +1,10 @@
 #include "physics_pool/local/engine.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <mutex>
+
+#include "idl/types/state.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -40,6 +43,31 @@ void install_engine_handlers() {
     mju_user_warning = ignore_warning;
     mjcb_contactfilter = filter_contact;
   });
+}
+
+void set_controls(mjData& data, std::span<const double> u) {
+  data.ctrl[0] = u[kControlX];
+  data.ctrl[1] = u[kControlY];
+  data.ctrl[2] = u[kControlRotation];
+  data.ctrl[3] = data.ctrl[4] = u[kControlOpening] / 2;
+}
+
+void forget(const mjModel& model, mjData& data) {
+  std::fill_n(data.qacc_warmstart, model.nv, 0.0);
+  for (mjWarningStat& warning : data.warning) warning.number = 0;
+  data.time = 0.0;
+}
+
+std::string divergence(const mjModel& model, const mjData& data) {
+  for (int i = 0; i < mjNWARNING; ++i) {
+    if (data.warning[i].number > 0) {
+      return mju_warningText(i, static_cast<std::size_t>(data.warning[i].lastinfo));
+    }
+  }
+  const auto is_finite = [](double value) { return std::isfinite(value); };
+  const bool finite = std::all_of(data.qpos, data.qpos + model.nq, is_finite) &&
+                      std::all_of(data.qvel, data.qvel + model.nv, is_finite);
+  return finite ? "" : "non-finite state";
 }
 
 const char* engine_version() { return mj_versionString(); }

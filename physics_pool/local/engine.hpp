@@ -6,7 +6,9 @@
 #include <mujoco/mujoco.h>
 
 #include <memory>
+#include <span>
 #include <stdexcept>
+#include <string>
 
 namespace jostle::physics_pool {
 
@@ -32,6 +34,17 @@ struct DataDeleter {
 };
 using ModelPtr = std::unique_ptr<mjModel, ModelDeleter>;
 using DataPtr = std::unique_ptr<mjData, DataDeleter>;
+
+/// Sets the drives to u [kControlAxes], m/s and rad/s; each finger takes half of
+/// the opening.
+void set_controls(mjData& data, std::span<const double> u);
+
+/// Leaves nothing of what ran before: warm start, warnings, time.
+void forget(const mjModel& model, mjData& data);
+
+/// Empty, or why the state is of no use: a warning since forget(), or a number
+/// that is not finite.
+std::string divergence(const mjModel& model, const mjData& data);
 
 /// geom_user[0] of the surface: it supports a body only while the body's
 /// centre is above it. MuJoCo's planes are infinite, yet they give steadier

@@ -2,28 +2,42 @@
 
 #include <algorithm>
 
+#include "physics_pool/local/reduced_simulator.hpp"
+#include "physics_pool/local/simulator.hpp"
+
 namespace jostle::physics_pool {
 namespace {
 
-// A thread's simulators, most recently used first. Re-planning alternates
-// between very few worlds; more would only hold memory.
-class SimulatorCache {
+// A thread's dynamics, most recently used first. Re-planning alternates between
+// very few worlds and fidelities; more would only hold memory.
+class DynamicsCache {
  public:
-  Simulator& of(const WorldPtr& world) {
-    const auto found = std::ranges::find_if(
-        cache_, [&](const auto& simulator) { return &simulator->world() == world.get(); });
+  Dynamics& of(const WorldPtr& world, const Fidelity& fidelity) {
+    const auto found = std::ranges::find_if(cache_, [&](const Entry& entry) {
+      return &entry.dynamics->world() == world.get() && entry.fidelity == fidelity;
+    });
     if (found != cache_.end()) {
       std::rotate(cache_.begin(), found, found + 1);
     } else {
       if (cache_.size() == kKept) cache_.pop_back();
-      cache_.insert(cache_.begin(), std::make_unique<Simulator>(world));
+      cache_.insert(cache_.begin(), {fidelity, make(world, fidelity)});
     }
-    return *cache_.front();
+    return *cache_.front().dynamics;
   }
 
  private:
+  struct Entry {
+    Fidelity fidelity;
+    std::unique_ptr<Dynamics> dynamics;
+  };
+
+  static std::unique_ptr<Dynamics> make(const WorldPtr& world, const Fidelity& fidelity) {
+    if (fidelity == Fidelity{}) return std::make_unique<Simulator>(world);
+    return std::make_unique<ReducedSimulator>(world, fidelity);
+  }
+
   static constexpr std::size_t kKept = 4;
-  std::vector<std::unique_ptr<Simulator>> cache_;
+  std::vector<Entry> cache_;
 };
 
 }  // namespace
@@ -48,7 +62,7 @@ void Executor::submit(BatchRunPtr run, std::uint32_t sample) {
 }
 
 void Executor::work(std::stop_token stop, int thread) {
-  SimulatorCache simulators;
+  DynamicsCache dynamics;
   std::unique_lock lock(mutex_);
   while (wake_.wait(lock, stop, [&] { return !jobs_.empty(); }) && !stop.stop_requested()) {
     Job job = std::move(jobs_.front());
@@ -57,7 +71,7 @@ void Executor::work(std::stop_token stop, int thread) {
     BatchRun& run = *job.run;
     RolloutOutcome outcome{.sample = job.sample};
     if (!run.signals.is_obsolete(job.sample)) {
-      outcome = run_rollout(simulators.of(run.world), run.batch, job.sample, run.signals);
+      outcome = run_rollout(dynamics.of(run.world, run.batch.fidelity), run.batch, job.sample, run.signals);
     }
     run.on_outcome(std::move(outcome), thread);
     job = {};

@@ -15,7 +15,8 @@ namespace {
 namespace hand = planar_gripper;
 
 // Collision masks: a pair meets if one's contype shares a bit with the other's
-// conaffinity. Objects meet everything; the robot meets walls and objects.
+// conaffinity. Objects meet everything; the robot meets walls and objects; frozen
+// objects meet the robot and free objects, but neither support nor each other.
 constexpr int kSupport = 1, kMovable = 2, kRobot = 4, kWall = 8;
 
 // The robot is velocity controlled: force = kv·(u - v). The engine treats it
@@ -47,11 +48,11 @@ class Writer {
 };
 
 // Light, colours and sky: pictures only, no influence on motion.
-void write_looks(Writer& xml) {
+void write_looks(Writer& xml, bool sky) {
   xml.line(R"(<statistic center="0 0 0" extent="1"/>)");
   xml.line(R"(<visual><global offwidth="1280" offheight="960"/><quality shadowsize="4096"/><map znear="0.02" zfar="20" shadowclip="1.2"/><headlight ambient="0.42 0.42 0.43" diffuse="0.22 0.22 0.22" specular="0.05 0.05 0.05"/></visual>)");
   xml.line("<asset>");
-  xml.line(R"(<texture name="sky" type="skybox" builtin="gradient" rgb1="0.97 0.98 0.99" rgb2="0.86 0.89 0.92" width="256" height="256"/>)");
+  if (sky) xml.line(R"(<texture name="sky" type="skybox" builtin="gradient" rgb1="0.97 0.98 0.99" rgb2="0.86 0.89 0.92" width="256" height="256"/>)");
   xml.line(R"(<material name="floor" rgba="0.80 0.82 0.84 1" specular="0" reflectance="0"/>)");
   xml.line(R"(<material name="wood" rgba="0.84 0.77 0.66 1" specular="0.05"/>)");
   xml.line(R"(<material name="steel" rgba="0.58 0.60 0.63 1" specular="0.4"/>)");
@@ -127,7 +128,7 @@ void write_robot(Writer& xml) {
   xml.line("</body>");
 }
 
-void write_object(Writer& xml, const SceneObject& object, bool is_target) {
+void write_object(Writer& xml, const SceneObject& object, bool is_target, bool is_free) {
   // Muted, distinct colours for clutter; the target is the green one.
   static constexpr std::array kPalette{"0.75 0.32 0.27 1", "0.30 0.47 0.71 1", "0.85 0.62 0.27 1",
                                        "0.54 0.40 0.66 1", "0.45 0.60 0.65 1"};
@@ -137,14 +138,14 @@ void write_object(Writer& xml, const SceneObject& object, bool is_target) {
           ? fmt::format(R"(type="box" size="{} {} {}")", object.size[0] / 2, object.size[1] / 2,
                         object.size[2] / 2)
           : fmt::format(R"(type="cylinder" size="{} {}")", object.radius, object.height / 2);
-  xml.line(R"(<body pos="{} {} {}" quat="{} 0 0 {}">)", object.x, object.y, object.rest_height(),
-           std::cos(object.yaw / 2), std::sin(object.yaw / 2));
-  xml.line("<freejoint/>");
+  xml.line(R"(<body pos="{} {} {}" quat="{} 0 0 {}" mocap="{}">)", object.x, object.y,
+           object.rest_height(), std::cos(object.yaw / 2), std::sin(object.yaw / 2), !is_free);
+  if (is_free) xml.line("<freejoint/>");
   // The object's friction is the one that counts against everything softer in
   // priority; between two objects the engine takes the larger one.
   xml.line(R"(<geom {} mass="{}" friction="{} 0.005 0.0001" condim="3" priority="1" rgba="{}" contype="{}" conaffinity="{}"/>)",
            size, object.mass, object.friction, is_target ? "0.20 0.65 0.30 1" : kPalette[colour],
-           kMovable, kSupport | kMovable | kRobot);
+           is_free ? kMovable : 0, (is_free ? kSupport : 0) | kMovable | kRobot);
   xml.line("</body>");
 }
 
@@ -155,24 +156,25 @@ void write_drive(Writer& xml, const char* joint, const Drive& drive) {
 
 }  // namespace
 
-std::string model_xml(const Scene& scene) {
-  const std::size_t bodies = scene.objects.size();
+std::string model_xml(const Scene& scene, const ModelContent& content) {
+  const int objects = static_cast<int>(scene.objects.size());
+  const int free = std::min(content.free, objects);
   // Four points under each object and room for about as many again with
   // neighbours (8 for a box on a box); a pyramid cone has four rows per point.
-  const std::size_t contacts = 14 * bodies + 32;
+  const int contacts = 14 * free + 32;
   Writer xml;
   xml.line(R"(<mujoco model="jostle">)");
   xml.line(R"(<compiler angle="radian" boundmass="0" autolimits="false"/>)");
   xml.line(R"(<option timestep="{}" iterations="{}" tolerance="{}" solver="Newton" jacobian="sparse" cone="pyramidal" integrator="Euler"/>)",
            scene.physics.time_step, scene.physics.iterations, scene.physics.tolerance);
   xml.line(R"(<size nconmax="{}" njmax="{}" nuser_geom="1"/>)", contacts, 4 * contacts + 8);
-  write_looks(xml);
+  write_looks(xml, content.looks);
   xml.line("<worldbody>");
   write_view(xml, scene.surface);
   write_surface(xml, scene.surface);
   write_robot(xml);
-  for (std::size_t i = 0; i < bodies; ++i) {
-    write_object(xml, scene.objects[i], static_cast<int>(i) == scene.target());
+  for (int i = 0; i < objects; ++i) {
+    write_object(xml, scene.objects[static_cast<std::size_t>(i)], i == scene.target(), i < free);
   }
   xml.line("</worldbody>");
   xml.line("<actuator>");

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <thread>
 
+#include "physics_pool/objective/bound.hpp"
+
 namespace jostle::physics_pool {
 namespace {
 
@@ -21,16 +23,16 @@ RolloutOutcome wait_instead(const RolloutBatch& batch, std::uint32_t sample, Bat
 
 }  // namespace
 
-RolloutOutcome run_rollout(Simulator& simulator, const RolloutBatch& batch, std::uint32_t sample,
+RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::uint32_t sample,
                            BatchSignals& signals) {
   if (batch.wait) return wait_instead(batch, sample, signals);
 
-  const TaskGeometry& geometry = simulator.world().geometry();
+  const TaskGeometry& geometry = dynamics.world().geometry();
   const Objective& objective = batch.objective;
   const ControlSequence controls = sample_controls(batch.nominal, batch.law, sample);
   const int steps = controls.steps();
   const int engine_steps =
-      static_cast<int>(std::lround(batch.step_duration / simulator.world().time_step()));
+      static_cast<int>(std::lround(batch.step_duration / dynamics.time_step()));
   const auto obsolete = [&signals, sample] { return signals.is_obsolete(sample); };
 
   RolloutOutcome outcome{.sample = sample};
@@ -53,8 +55,9 @@ RolloutOutcome run_rollout(Simulator& simulator, const RolloutBatch& batch, std:
     const auto u_before = t == 0 ? std::span<const double>(batch.u_before)
                                  : std::as_const(controls).step(t - 1);
     const auto u = std::as_const(controls).step(t);
-    auto advance = simulator.advance(x, u, engine_steps, obsolete);
+    auto advance = dynamics.advance(x, u, engine_steps, obsolete);
     outcome.engine_steps += advance.engine_steps;
+    outcome.thawed += advance.thawed;
     if (advance.interrupted) return finish(End::kSkipped);
     if (!advance.diverged.empty()) {
       outcome.reason = std::move(advance.diverged);
@@ -79,11 +82,14 @@ RolloutOutcome run_rollout(Simulator& simulator, const RolloutBatch& batch, std:
       sum += goal;
       outcome.step_costs.back() += goal;
     }
-    const bool can_succeed = batch.stop_on_success && sum <= objective.success_cost;
-    if (!last && batch.stop_losers && !can_succeed &&
-        (sum >= batch.incumbent || sum > signals.best())) {
-      return finish(End::kLost);
+    if (last || !batch.stop_losers) continue;
+    Outlook ahead;
+    if (batch.stop_hopeless) {
+      ahead = outlook(geometry, objective, controls, t + 1, u, x, batch.step_duration);
     }
+    const bool can_succeed = batch.stop_on_success && sum <= objective.success_cost && ahead.may_grasp;
+    const double least = sum + ahead.cost;
+    if (!can_succeed && (least >= batch.incumbent || least > signals.best())) return finish(End::kLost);
   }
   signals.offer_cost(sum);
   return finish(End::kCompleted);

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "physics_pool/api/rollout.hpp"
-#include "physics_pool/local/simulator.hpp"
+#include "physics_pool/local/dynamics.hpp"
 
 namespace jostle::physics_pool {
 
@@ -44,11 +44,12 @@ class BatchSignals {
 ///
 /// A rollout stops as lost only when its running sum has reached the incumbent
 /// or passed the best sibling, and is above the cost at which it could still
-/// succeed: costs are >= 0, so it can neither win nor succeed any more. When
+/// succeed: costs are >= 0, so it can neither win nor succeed any more. With
+/// `stop_hopeless` the sum includes what is certain to come (bound.hpp). When
 /// siblings' news arrive is a matter of timing; who wins is not.
 ///
 /// An obsolete rollout (cancelled, or a lower index succeeded) ends as kSkipped.
-RolloutOutcome run_rollout(Simulator& simulator, const RolloutBatch& batch, std::uint32_t sample,
+RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::uint32_t sample,
                            BatchSignals& signals);
 
 }  // namespace jostle::physics_pool

@@ -1,9 +1,6 @@
 #include "physics_pool/local/simulator.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cmath>
 
 namespace jostle::physics_pool {
 
@@ -11,31 +8,15 @@ Simulator::Simulator(WorldPtr world)
     : world_(std::move(world)), data_(mj_makeData(world_->model())) {}
 
 void Simulator::begin(const State& x, std::span<const double> u) {
-  mjData& data = *data_;
-  std::ranges::copy(x.q, data.qpos);
-  std::ranges::copy(x.v, data.qvel);
-  std::fill_n(data.qacc_warmstart, world_->model()->nv, 0.0);
-  for (mjWarningStat& warning : data.warning) warning.number = 0;
-  data.time = 0.0;
-  data.ctrl[0] = u[kControlX];
-  data.ctrl[1] = u[kControlY];
-  data.ctrl[2] = u[kControlRotation];
-  data.ctrl[3] = data.ctrl[4] = u[kControlOpening] / 2;  // each finger takes half
+  std::ranges::copy(x.q, data_->qpos);
+  std::ranges::copy(x.v, data_->qvel);
+  forget(*world_->model(), *data_);
+  set_controls(*data_, u);
 }
 
 void Simulator::step() { mj_step(world_->model(), data_.get()); }
 
-std::string Simulator::divergence() const {
-  for (int i = 0; i < mjNWARNING; ++i) {
-    if (data_->warning[i].number > 0) {
-      return mju_warningText(i, static_cast<std::size_t>(data_->warning[i].lastinfo));
-    }
-  }
-  const mjModel& model = *world_->model();
-  const bool finite = std::all_of(data_->qpos, data_->qpos + model.nq, [](double value) { return std::isfinite(value); }) &&
-                      std::all_of(data_->qvel, data_->qvel + model.nv, [](double value) { return std::isfinite(value); });
-  return finite ? "" : "non-finite state";
-}
+std::string Simulator::divergence() const { return physics_pool::divergence(*world_->model(), *data_); }
 
 void Simulator::read(State& x) const {
   const mjModel& model = *world_->model();
@@ -45,7 +26,7 @@ void Simulator::read(State& x) const {
 
 void Simulator::add_velocity(int dof, double amount) { data_->qvel[dof] += amount; }
 
-Simulator::Advance Simulator::advance(State& x, std::span<const double> u, int engine_steps,
+Advance Simulator::advance(State& x, std::span<const double> u, int engine_steps,
                                       const std::function<bool()>& interrupted) {
   Advance result;
   try {

@@ -2,35 +2,21 @@
 /// \file
 /// The fine model F of one thread.
 
-#include <functional>
-#include <optional>
-#include <span>
-#include <string>
-
-#include "idl/types/state.hpp"
-#include "physics_pool/local/world.hpp"
+#include "physics_pool/local/dynamics.hpp"
 
 namespace jostle::physics_pool {
 
-/// Steps one world. Owns the engine's scratch data; one thread at a time.
-/// Nothing is allocated after construction.
-class Simulator {
+/// Steps one world with all its physics. Owns the engine's scratch data; one
+/// thread at a time. Nothing is allocated after construction.
+class Simulator final : public Dynamics {
  public:
   explicit Simulator(WorldPtr world);
 
-  const World& world() const { return *world_; }
+  const World& world() const override { return *world_; }
+  double time_step() const override { return world_->time_step(); }
 
-  /// How far an advance came.
-  struct Advance {
-    std::uint64_t engine_steps = 0;
-    bool interrupted = false;
-    std::string diverged;  ///< empty, or why the state is of no use
-  };
-
-  /// x <- F(x, u): resets the solver's warm start, sets state and control, runs
-  /// `engine_steps`. `interrupted` is asked before each step; may be empty.
   Advance advance(State& x, std::span<const double> u, int engine_steps,
-                  const std::function<bool()>& interrupted = {});
+                  const std::function<bool()>& interrupted = {}) override;
 
   /// The same in parts, for worlds that are observed or disturbed while they
   /// move: begin once, then step as often as needed.

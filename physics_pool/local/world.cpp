@@ -39,11 +39,15 @@ Result<ModelPtr> compile_xml(const std::string& xml) {
 }  // namespace
 
 World::World(const Scene& scene, ModelPtr model)
-    : scene_(scene), hash_(scene_hash(scene)), geometry_(scene), model_(std::move(model)) {}
+    : scene_(scene),
+      hash_(scene_hash(scene)),
+      geometry_(scene),
+      model_(std::move(model)),
+      reduced_(scene.objects.size() + 1) {}
 
-Result<WorldPtr> World::compile(const Scene& scene) {
+Result<WorldPtr> World::compile(const Scene& scene, Purpose purpose) {
   install_engine_handlers();
-  auto model_result = compile_xml(model_xml(scene));
+  auto model_result = compile_xml(model_xml(scene, {.looks = purpose == Purpose::kPictures}));
   if (!model_result) return model_result.error();
   WorldPtr world(new World(scene, std::move(model_result).value()));
   const StateLayout& layout = world->geometry().layout;
@@ -53,6 +57,17 @@ Result<WorldPtr> World::compile(const Scene& scene) {
                              scene.name, world->model()->nq, world->model()->nv, layout.nq, layout.nv)};
   }
   return world;
+}
+
+const mjModel* World::reduced_model(int free) const {
+  const std::lock_guard lock(mutex_);
+  ModelPtr& model = reduced_.at(static_cast<std::size_t>(free));
+  if (!model) {
+    auto model_result = compile_xml(model_xml(scene_, {.free = free}));
+    if (!model_result) throw EngineError(model_result.error().message);
+    model = std::move(model_result).value();
+  }
+  return model.get();
 }
 
 }  // namespace jostle::physics_pool

@@ -3,6 +3,8 @@
 /// World: a compiled scene.
 
 #include <memory>
+#include <mutex>
+#include <vector>
 
 #include "idl/types/hash.hpp"
 #include "idl/types/result.hpp"
@@ -20,14 +22,21 @@ using WorldPtr = std::shared_ptr<const World>;
 /// Immutable after compilation; read by any number of threads.
 class World {
  public:
+  enum class Purpose { kPhysics, kPictures };
+
   /// Errors   kInvalidArgument  the engine refused the model; says why.
-  static Result<WorldPtr> compile(const Scene& scene);
+  static Result<WorldPtr> compile(const Scene& scene, Purpose purpose = Purpose::kPhysics);
 
   const Scene& scene() const { return scene_; }
   const Hash& hash() const { return hash_; }
   const TaskGeometry& geometry() const { return geometry_; }
   const mjModel* model() const { return model_.get(); }
   double time_step() const { return scene_.physics.time_step; }
+
+  /// The same world in which only the first `free` objects can move (see
+  /// ModelContent). Compiled when first asked for, once for all threads.
+  /// Threads  safe from any thread. Throws EngineError.
+  const mjModel* reduced_model(int free) const;
 
  private:
   World(const Scene& scene, ModelPtr model);
@@ -36,6 +45,8 @@ class World {
   Hash hash_;
   TaskGeometry geometry_;
   ModelPtr model_;
+  mutable std::mutex mutex_;  // guards reduced_
+  mutable std::vector<ModelPtr> reduced_;  // by number of free objects; empty until asked for
 };
 
 }  // namespace jostle::physics_pool

@@ -74,7 +74,7 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 Renderer::~Renderer() = default;
 
 Result<Renderer> Renderer::create(const Scene& scene, const RenderOptions& options) {
-  auto world_result = World::compile(scene);
+  auto world_result = World::compile(scene, World::Purpose::kPictures);
   if (!world_result) return world_result.error();
   const mjModel* model = (*world_result)->model();
   auto camera_result = find_camera(model, options.camera);

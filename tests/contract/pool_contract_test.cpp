@@ -170,6 +170,34 @@ TEST_P(PoolContract, SamplesAreNamedFromTheFirstOneAsked) {
   EXPECT_EQ(some.outcomes[1].cost, all.outcomes[4].cost);
 }
 
+TEST_P(PoolContract, ReducedPhysicsGivesTheSameBitsEverywhere) {
+  for (const Fidelity& fidelity : {Fidelity{.freeze = true}, Fidelity{.freeze = true, .time_step = 0.008}}) {
+    RolloutBatch batch = push_batch(scene, 6);
+    batch.stop_losers = false;
+    batch.want_all_trajectories = true;
+    batch.fidelity = fidelity;
+    batch.law.draws = {3, 1, 4, 15, 9, 26};
+
+    const BatchReply reply = run(batch), wanted = reference(batch);
+
+    EXPECT_EQ(fingerprints(reply), fingerprints(wanted));
+    for (std::size_t i = 0; i < reply.outcomes.size(); ++i) {
+      EXPECT_EQ(reply.outcomes[i].thawed, wanted.outcomes[i].thawed);
+    }
+  }
+}
+
+// The bound may stop a loser sooner; it never changes who wins.
+TEST_P(PoolContract, StoppingTheHopelessNeverChangesTheWinner) {
+  RolloutBatch batch = push_batch(scene, 8);
+  batch.stop_on_success = true;
+  const BatchReply open = run(batch);
+  ASSERT_GE(open.winner, 0);
+  batch.stop_hopeless = true;
+
+  EXPECT_EQ(winner_fingerprint(run(batch)), winner_fingerprint(open));
+}
+
 TEST_P(PoolContract, UnknownWorldIsAnErrorThatNamesIt) {
   RolloutBatch batch = push_batch(scene, 1);
   batch.world = {.high = 0xabad1dea, .low = 7};

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "physics_pool/local/reduced_simulator.hpp"
 #include "physics_pool/local/simulator.hpp"
 #include "tests/support/scenes.hpp"
 
@@ -66,6 +67,24 @@ TEST_F(AllocationTest, AdvanceAllocatesNothingAfterConstruction) {
   for (int i = 0; i < 10; ++i) (void)sut.advance(x, u, 100);
   EXPECT_EQ(allocations, before);
   EXPECT_NE(x, start);
+}
+
+TEST_F(AllocationTest, AdvanceWithFrozenObjectsAllocatesNothingOnceItsModelsExist) {
+  Scene scene = tests::three_objects();
+  scene.robot.x = -0.15;
+  const WorldPtr world = std::move(World::compile(scene)).value();
+  ReducedSimulator sut(world, {.freeze = true});
+  const std::array<double, 4> u{0.1, 0.0, 0.2, 0.0};
+  std::uint32_t thawed = 0;
+  long before = 0;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    State x = initial_state(scene);
+    thawed = 0;
+    before = allocations;
+    for (int i = 0; i < 10; ++i) thawed += sut.advance(x, u, 100).thawed;
+  }
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(thawed, 0u);
 }
 
 TEST_F(AllocationTest, AdvanceAllocatesNothingWithAnInterruptOfTwoPointers) {

@@ -4,6 +4,7 @@
 
 #include <numeric>
 
+#include "physics_pool/local/simulator.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {

@@ -45,7 +45,7 @@ class SimulatorTest : public testing::Test {
     sut = std::make_unique<Simulator>(world);
     x = initial_state(scene);
   }
-  Simulator::Advance run(const std::vector<double>& u, double seconds) {
+  Advance run(const std::vector<double>& u, double seconds) {
     return sut->advance(x, u, steps(*world, seconds));
   }
 

@@ -1,0 +1,41 @@
+#pragma once
+/// \file
+/// Dynamics: what brings a state from one control step to the next.
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+
+#include "idl/types/state.hpp"
+#include "physics_pool/local/world.hpp"
+
+namespace jostle::physics_pool {
+
+/// How far an advance came.
+struct Advance {
+  std::uint64_t engine_steps = 0;
+  std::uint32_t thawed = 0;  ///< frozen objects that were touched and set free
+  bool interrupted = false;
+  std::string diverged;  ///< empty, or why the state is of no use
+};
+
+/// x <- F(x, u), a pure function of its arguments: nothing of the engine's memory
+/// reaches the next call, so a trajectory may be cut at any control step and
+/// continued elsewhere. States are always those of the full world.
+///
+/// Threads  one at a time.
+class Dynamics {
+ public:
+  virtual ~Dynamics() = default;
+
+  virtual const World& world() const = 0;
+  virtual double time_step() const = 0;  ///< s
+
+  /// Runs `engine_steps` from x under u. `interrupted` is asked before each step;
+  /// may be empty.
+  virtual Advance advance(State& x, std::span<const double> u, int engine_steps,
+                          const std::function<bool()>& interrupted = {}) = 0;
+};
+
+}  // namespace jostle::physics_pool

@@ -1,0 +1,216 @@
+#include "physics_pool/local/reduced_simulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace jostle::physics_pool {
+namespace {
+
+// Below these an object that slides comes to rest within micrometres, and one that
+// leans is not falling. Settling gives less than a millimetre of height.
+constexpr double kStillSpeed = 0.002;     // m/s
+constexpr double kStillRotation = 0.02;   // rad/s
+constexpr double kStandingHeight = 0.001; // m
+constexpr double kStandingLean = 1.5e-4;  // 1 - cos of the tilt: 1 degree
+
+// A velocity drive is stepped explicitly: kv·h/inertia above 1 would overshoot, and
+// above 2 diverge. The fine model has 0.2.
+constexpr double kDriveRatio = 0.4;
+
+double squared_norm(const double* v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
+
+// Entries [width·from, …) of one model's array to [width·to, …) of another's.
+template <class T>
+void copy_entry(const T* source, int from, T* destination, int to, int width = 1) {
+  std::copy_n(source + from * width, width, destination + to * width);
+}
+
+void lengthen_step(mjModel& model, double time_step) {
+  model.opt.timestep = time_step;
+  for (int i = 0; i < model.nu; ++i) {
+    const int dof = model.jnt_dofadr[model.actuator_trnid[2 * i]];
+    double& gain = model.actuator_gainprm[mjNGAIN * i];
+    gain = std::min(gain, kDriveRatio * model.dof_M0[dof] / time_step);
+    model.actuator_biasprm[mjNBIAS * i + 2] = -gain;
+  }
+}
+
+}  // namespace
+
+// A thread's copy of the model with `free` free objects, and who they are.
+struct ReducedSimulator::Part {
+  Part(const World& world, int free_count, double time_step)
+      : full(*world.model()),
+        objects(static_cast<int>(world.scene().objects.size())),
+        free(free_count),
+        model(mj_copyModel(nullptr, free == objects ? world.model() : world.reduced_model(free))),
+        data(mj_makeData(model.get())),
+        members(static_cast<std::size_t>(objects), -1) {
+    if (time_step != world.time_step()) lengthen_step(*model, time_step);
+  }
+
+  int first_geom() const { return model->ngeom - objects; }
+
+  // Puts the shape and weight of `object` into slot `slot`. Numbers come from the
+  // full model, where the engine's compiler has worked them out.
+  void put(int slot, int object) {
+    if (members[static_cast<std::size_t>(slot)] == object) return;
+    members[static_cast<std::size_t>(slot)] = object;
+    mjModel& m = *model;
+    const int from_geom = full.ngeom - objects + object, to_geom = first_geom() + slot;
+    copy_entry(full.geom_type, from_geom, m.geom_type, to_geom);
+    copy_entry(full.geom_size, from_geom, m.geom_size, to_geom, 3);
+    copy_entry(full.geom_rbound, from_geom, m.geom_rbound, to_geom);
+    copy_entry(full.geom_friction, from_geom, m.geom_friction, to_geom, 3);
+    const int from_body = full.nbody - objects + object, to_body = m.nbody - objects + slot;
+    copy_entry(full.body_mass, from_body, m.body_mass, to_body);
+    copy_entry(full.body_subtreemass, from_body, m.body_subtreemass, to_body);
+    copy_entry(full.body_inertia, from_body, m.body_inertia, to_body, 3);
+    if (slot >= free) return;
+    copy_entry(full.body_invweight0, from_body, m.body_invweight0, to_body, 2);
+    const int from_dof = full.body_dofadr[from_body], to_dof = m.body_dofadr[to_body];
+    for (int i = 0; i < 6; ++i) {
+      copy_entry(full.dof_invweight0, from_dof + i, m.dof_invweight0, to_dof + i);
+      copy_entry(full.dof_M0, from_dof + i, m.dof_M0, to_dof + i);
+    }
+  }
+
+  // Free objects first, both groups in the scene's order.
+  void assign(const std::vector<bool>& is_free) {
+    int next_free = 0, next_frozen = free;
+    for (int i = 0; i < objects; ++i) put(is_free[static_cast<std::size_t>(i)] ? next_free++ : next_frozen++, i);
+    mjModel& m = *model;
+    m.stat.meaninertia = std::accumulate(m.dof_M0, m.dof_M0 + m.nv, 0.0) / m.nv;
+  }
+
+  void inject(const StateLayout& layout, const State& x) {
+    std::copy_n(x.q.begin(), kRobotJoints, data->qpos);
+    std::copy_n(x.v.begin(), kRobotJoints, data->qvel);
+    for (int slot = 0; slot < objects; ++slot) {
+      const ObjectSlot& at = slot_of(layout, slot);
+      const auto q = x.q.begin() + at.q;
+      if (slot < free) {
+        std::copy_n(q, 7, data->qpos + kRobotJoints + 7 * slot);
+        std::copy_n(x.v.begin() + at.v, 6, data->qvel + kRobotJoints + 6 * slot);
+      } else {
+        std::copy_n(q, 3, data->mocap_pos + 3 * (slot - free));
+        std::copy_n(q + 3, 4, data->mocap_quat + 4 * (slot - free));
+      }
+    }
+    forget(*model, *data);
+  }
+
+  void read(const StateLayout& layout, State& x) const {
+    std::copy_n(data->qpos, kRobotJoints, x.q.begin());
+    std::copy_n(data->qvel, kRobotJoints, x.v.begin());
+    for (int slot = 0; slot < free; ++slot) {
+      const ObjectSlot& at = slot_of(layout, slot);
+      std::copy_n(data->qpos + kRobotJoints + 7 * slot, 7, x.q.begin() + at.q);
+      std::copy_n(data->qvel + kRobotJoints + 6 * slot, 6, x.v.begin() + at.v);
+    }
+  }
+
+  const ObjectSlot& slot_of(const StateLayout& layout, int slot) const {
+    return layout.objects[static_cast<std::size_t>(members[static_cast<std::size_t>(slot)])];
+  }
+
+  const mjModel& full;
+  const int objects, free;
+  ModelPtr model;
+  DataPtr data;
+  std::vector<int> members;  // object of each slot
+};
+
+ReducedSimulator::ReducedSimulator(WorldPtr world, const Fidelity& fidelity)
+    : world_(std::move(world)),
+      fidelity_(fidelity),
+      time_step_(fidelity.time_step > 0 ? fidelity.time_step : world_->time_step()),
+      free_(world_->scene().objects.size(), true),
+      parts_(world_->scene().objects.size() + 1) {}
+
+ReducedSimulator::~ReducedSimulator() = default;
+
+bool stands_still(const TaskGeometry& geometry, const State& x, std::size_t object) {
+  const ObjectSlot& slot = geometry.layout.objects[object];
+  const double* q = &x.q[static_cast<std::size_t>(slot.q)];
+  const double* v = &x.v[static_cast<std::size_t>(slot.v)];
+  return squared_norm(v) < kStillSpeed * kStillSpeed &&
+         squared_norm(v + 3) < kStillRotation * kStillRotation &&
+         std::abs(q[2] - geometry.rest_heights[object]) < kStandingHeight &&
+         2 * (q[4] * q[4] + q[5] * q[5]) < kStandingLean;
+}
+
+void ReducedSimulator::freeze(const State& x) {
+  for (std::size_t i = 0; i < free_.size(); ++i) {
+    free_[i] = !fidelity_.freeze || !stands_still(world_->geometry(), x, i);
+  }
+}
+
+ReducedSimulator::Part& ReducedSimulator::enter(const State& x, std::span<const double> u) {
+  const auto count = static_cast<int>(std::ranges::count(free_, true));
+  std::unique_ptr<Part>& part = parts_[static_cast<std::size_t>(count)];
+  if (!part) part = std::make_unique<Part>(*world_, count, time_step_);
+  part->assign(free_);
+  part->inject(world_->geometry().layout, x);
+  set_controls(*part->data, u);
+  return *part;
+}
+
+// Looks for frozen objects among the contacts of the step that is being prepared.
+// Two of them never meet, so whatever meets one can move.
+int ReducedSimulator::thaw_touched(const Part& part) {
+  const int first_frozen = part.first_geom() + part.free;
+  int thawed = 0;
+  for (int i = 0; i < part.data->ncon; ++i) {
+    const mjContact& contact = part.data->contact[i];
+    for (const int geom : {contact.geom1, contact.geom2}) {
+      if (geom < first_frozen) continue;
+      const auto object = static_cast<std::size_t>(part.members[static_cast<std::size_t>(geom - part.first_geom())]);
+      thawed += free_[object] ? 0 : 1;
+      free_[object] = true;
+    }
+  }
+  return thawed;
+}
+
+void ReducedSimulator::run(Advance& result, State& x, std::span<const double> u, int engine_steps,
+                           const std::function<bool()>& interrupted) {
+  const StateLayout& layout = world_->geometry().layout;
+  Part* part = &enter(x, u);
+  for (int i = 0; i < engine_steps; ++i) {
+    if (interrupted && interrupted()) {
+      result.interrupted = true;
+      return;
+    }
+    mj_step1(part->model.get(), part->data.get());
+    while (const int thawed = thaw_touched(*part)) {
+      result.thawed += static_cast<std::uint32_t>(thawed);
+      result.diverged = divergence(*part->model, *part->data);
+      if (!result.diverged.empty()) return;
+      part->read(layout, x);
+      part = &enter(x, u);
+      mj_step1(part->model.get(), part->data.get());
+    }
+    mj_step2(part->model.get(), part->data.get());
+    ++result.engine_steps;
+  }
+  result.diverged = divergence(*part->model, *part->data);
+  part->read(layout, x);
+}
+
+Advance ReducedSimulator::advance(State& x, std::span<const double> u, int engine_steps,
+                                  const std::function<bool()>& interrupted) {
+  Advance result;
+  try {
+    freeze(x);
+    run(result, x, u, engine_steps, interrupted);
+  } catch (const EngineError& error) {
+    // The engine was left in the middle of a step: its scratch is unusable.
+    for (auto& part : parts_) part.reset();
+    result.diverged = error.what();
+  }
+  return result;
+}
+
+}  // namespace jostle::physics_pool

@@ -1,0 +1,35 @@
+#pragma once
+/// \file
+/// What a rollout that is under way is bound to pay, whatever physics does next.
+
+#include <span>
+
+#include "idl/types/state.hpp"
+#include "physics_pool/api/objective.hpp"
+#include "physics_pool/objective/terms.hpp"
+
+namespace jostle::physics_pool {
+
+/// Of a rollout before control step `done`, whose controls are known.
+struct Outlook {
+  double cost = 0.0;      ///< at least this is still to come: running costs and goal
+  bool may_grasp = true;  ///< the target can still come into the pre-grasp region
+};
+
+/// Known for certain: the changes of control, and that what has dropped stays down.
+/// Of the goal's cost: distance shrinks no faster than hand and target can approach
+/// each other,
+///
+///   d_T(end) >= d_T - sum_s (2·a_s + w_s·(d_T + a_0 + … + a_s) + f_s)·Delta_t
+///
+/// with a_s the hand's speed in step s, w_s its rate of turning and f_s the speed of
+/// a finger, each the larger of what is commanded and what was commanded before (a
+/// drive never overshoots). Assumes that the target moves no faster than the hand
+/// and what turns with it at the target's distance would; nothing in a scene
+/// moves but what the hand has pushed, and contacts do not bounce.
+///
+/// `u_before`: control before step `done`.
+Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls,
+                int done, std::span<const double> u_before, const State& x, double step_duration);
+
+}  // namespace jostle::physics_pool

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <unistd.h>
-#include <stdlib.h>
 #include <time.h>
 
 #include "services/support/files.hpp"
@@ -37,9 +36,9 @@ Helpers::~Helpers() {
 
 Result<void> Helpers::start(const std::string& program, std::vector<std::string> arguments) {
   if (folder_.empty()) {
-    std::string name = (std::filesystem::temp_directory_path() / "jostle-bench-XXXXXX").string();
-    if (!mkdtemp(name.data())) return Error{Code::kIo, fmt::format("{}: cannot be made", name)};
-    folder_ = name;
+    auto folder_result = make_temporary_folder("bench");
+    if (!folder_result) return folder_result.error();
+    folder_ = *folder_result;
   }
   arguments.insert(arguments.end(), {"--domain", std::to_string(domain_)});
   std::optional<Pinned> pinned;

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "services/support/files.hpp"
 
@@ -18,12 +17,6 @@ constexpr std::chrono::seconds kCancelPatience{2};
 constexpr int kMostRestarts = 5;                     // within kRestartWindow: something is wrong
 constexpr std::chrono::seconds kRestartWindow{10};
 
-Result<std::filesystem::path> make_folder() {
-  std::string name = (std::filesystem::temp_directory_path() / "jostle-run-XXXXXX").string();
-  if (mkdtemp(name.data())) return std::filesystem::path(name);
-  return Error{Code::kIo, fmt::format("{}: cannot be made", name)};
-}
-
 std::filesystem::path program(const char* name) {
   return program_folder() / (std::string("jostle_") + name);
 }
@@ -33,7 +26,7 @@ std::filesystem::path program(const char* name) {
 Result<std::unique_ptr<Session>> Session::start(const RunOptions& options, Watcher watcher) {
   auto participant_result = dds::Participant::open({.name = "jostle_run", .domain = options.domain});
   if (!participant_result) return participant_result.error();
-  auto folder_result = make_folder();
+  auto folder_result = make_temporary_folder("run");
   if (!folder_result) return folder_result.error();
   std::unique_ptr<Session> session(
       new Session(options, std::move(watcher), *participant_result, *folder_result));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
@@ -38,6 +39,12 @@ Result<void> write_text(const fs::path& file, const std::string& text) {
   fs::remove(draft, ignored);
   return Error{Code::kIo, fmt::format("{}: cannot be written{}", file.string(),
                                       problem ? ": " + problem.message() : "")};
+}
+
+Result<fs::path> make_temporary_folder(const std::string& purpose) {
+  std::string name = (fs::temp_directory_path() / fmt::format("jostle-{}-XXXXXX", purpose)).string();
+  if (mkdtemp(name.data())) return fs::path(name);
+  return Error{Code::kIo, fmt::format("{}: cannot be made", name)};
 }
 
 }  // namespace jostle::services

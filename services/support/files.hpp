@@ -23,4 +23,8 @@ Result<std::string> read_text(const std::filesystem::path& file);
 /// never sees half of it. Error kIo naming the file.
 Result<void> write_text(const std::filesystem::path& file, const std::string& text);
 
+/// A new folder that only this user can read, for its caller to remove; `purpose`
+/// becomes part of its name. Error kIo naming it.
+Result<std::filesystem::path> make_temporary_folder(const std::string& purpose);
+
 }  // namespace jostle::services

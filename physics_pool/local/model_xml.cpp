@@ -159,9 +159,10 @@ void write_drive(Writer& xml, const char* joint, const Drive& drive) {
 std::string model_xml(const Scene& scene, const ModelContent& content) {
   const int objects = static_cast<int>(scene.objects.size());
   const int free = std::min(content.free, objects);
-  // Four points under each object and room for about as many again with
-  // neighbours (8 for a box on a box); a pyramid cone has four rows per point.
-  const int contacts = 14 * free + 32;
+  // Four points under each object and as many with neighbours; a pyramid cone has
+  // four rows per point. Pushed clutter of 6 to 31 objects was measured to have 4.3
+  // contacts per object at most. Scratch memory grows with the square of the rows.
+  const int contacts = 8 * free + 32;
   Writer xml;
   xml.line(R"(<mujoco model="jostle">)");
   xml.line(R"(<compiler angle="radian" boundmass="0" autolimits="false"/>)");

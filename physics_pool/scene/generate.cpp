@@ -17,6 +17,10 @@ constexpr std::uint32_t kSceneStream = 0x5ce4e;
 constexpr std::uint32_t kPerturbStream = 0x9e57;
 constexpr int kPlacementTries = 20000;
 
+constexpr double kTable = 0.6, kLargestTable = 2.0;  // m, side
+constexpr int kThesisObjects = 15;                   // on the smaller one
+constexpr double kStart = -0.33;                     // m, of the hand before the smaller one
+
 // Footnote 2 of Ch. 3, low uncertainty.
 constexpr double kPositionSigma = 0.005;  // m
 constexpr double kYawSigma = 0.005;       // rad
@@ -51,10 +55,17 @@ Result<Scene> generate_chapter3(const GenerateOptions& options) {
     return Error{Code::kInvalidArgument,
                  fmt::format("objects: got {}, wanted 0 to 40", options.objects)};
   }
+  const double side = options.table != 0 ? options.table
+                                         : kTable * std::sqrt(std::max(options.objects, kThesisObjects) / double{kThesisObjects});
+  if (!(side >= kTable && side <= kLargestTable)) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("table: got {} m, wanted {} to {} m", side, kTable, kLargestTable)};
+  }
   CounterStream random(options.seed, kSceneStream);
   Scene scene;
   scene.name = fmt::format("chapter3-{}-{}", options.objects, options.seed);
-  scene.robot = {.x = -0.33, .y = 0.0, .rotation = 0.0, .opening = 0.085};
+  scene.surface.size = {side, side};
+  scene.robot = {.x = kStart - (side - kTable) / 2, .y = 0.0, .rotation = 0.0, .opening = 0.085};
   scene.task = {.kind = "grasp", .target = "target"};
 
   SceneObject target{.name = "target", .shape = Shape::kBox};

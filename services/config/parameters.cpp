@@ -36,6 +36,10 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
         {{"greedy", PbstoOptions::Update::kGreedy}, {"cost-weighted", PbstoOptions::Update::kCostWeighted}});
     in.optional("lambda", planner.lambda);
     in.optional("stop_losers", planner.stop_losers);
+    in.optional("stop_hopeless", planner.stop_hopeless);
+    in.optional("freeze", planner.freeze);
+    in.optional("screening", planner.screening);
+    in.optional("screening_time_step", planner.screening_time_step);
   });
   fields.section("objective", false, [&](yaml::Fields& in) {
     in.optional("goal", objective.goal);
@@ -82,6 +86,8 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
   const PbstoOptions& planner = parameters.planner;
   const ControlOptions& control = parameters.control;
   for (const Range& range : {Range{"planner.rollouts", double(planner.rollouts), 1, physics_pool::kMaxSamples},
+                             Range{"planner.screening", double(planner.screening), 1, 1e4},
+                             Range{"planner.screening_time_step", planner.screening_time_step, 1e-4, physics_pool::kMaxTimeStep},
                              Range{"planner.lambda", planner.lambda, 1e-9, 1e12},
                              Range{"min_steps", double(planner.min_steps), 0, physics_pool::kMaxSteps},
                              Range{"step_duration", planner.step_duration, 1e-3, physics_pool::kMaxStepDuration},

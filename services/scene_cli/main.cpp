@@ -108,6 +108,8 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
       ->capture_default_str();
   generates->add_option("--objects", arguments.generate.objects, "objects beside the target, 0 to 40")
       ->capture_default_str();
+  generates->add_option("--table", arguments.generate.table, "side of the table, m; 0: 0.6, larger for more than 15 objects")
+      ->capture_default_str();
   add_output(*generates, arguments);
 
   add_input(*command("check", "say ok and the scene's hash, or what is wrong", check), arguments);

@@ -135,28 +135,38 @@ TEST(GenerateChapter3, RepeatsForEqualSeedsAndDiffersForOthers) {
 
 class GenerateCount : public testing::TestWithParam<int> {};
 
-TEST_P(GenerateCount, GivesThatManyObjectsOrSaysWhyNot) {
+TEST_P(GenerateCount, GivesThatManyObjects) {
   const int objects = GetParam();
-  int made = 0;
-  for (std::uint64_t seed = 0; seed < 5; ++seed) {
-    const auto scene = generate_chapter3({.objects = objects, .seed = seed});
-    if (scene) {
-      ++made;
-      EXPECT_EQ(scene->objects.size(), static_cast<std::size_t>(objects) + 1);
-      EXPECT_TRUE(validate(*scene, "generated"));
-    } else {
-      EXPECT_GT(objects, 15);  // Sec. 3.3.1 must always work
-      EXPECT_EQ(scene.error().code, Code::kInvalidArgument);
-      EXPECT_THAT(scene.error().message, HasSubstr("objects"));
-      EXPECT_THAT(scene.error().message, HasSubstr("wanted"));
-    }
-  }
-  if (objects <= 15) {
-    EXPECT_EQ(made, 5);
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    const Scene scene = generated({.objects = objects, .seed = seed});
+    EXPECT_EQ(scene.objects.size(), static_cast<std::size_t>(objects) + 1);
+    EXPECT_TRUE(validate(scene, "generated"));
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Counts, GenerateCount, testing::Values(0, 1, 15, 25, 40));
+
+TEST(GenerateChapter3, KeepsTheDensityOfTheThesisForMoreObjects) {
+  EXPECT_EQ(generated({.objects = 5}).surface.size[0], 0.6);
+  EXPECT_NEAR(generated({.objects = 40}).surface.size[0], 0.6 * std::sqrt(40.0 / 15.0), 1e-12);
+  EXPECT_EQ(generated({.objects = 5, .table = 0.8}).surface.size, (std::array{0.8, 0.8}));
+  EXPECT_EQ(generated({.objects = 5}).robot.x, -0.33);
+}
+
+TEST(GenerateChapter3, SaysWhenThereIsNoRoomLeft) {
+  const auto scene = generate_chapter3({.objects = 40, .table = 0.6});
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, Code::kInvalidArgument);
+  EXPECT_THAT(scene.error().message, HasSubstr("no free place left for number"));
+}
+
+TEST(GenerateChapter3, RefusesImpossibleTables) {
+  for (const double table : {0.1, 5.0, -1.0, std::nan("")}) {
+    const auto scene = generate_chapter3({.table = table});
+    ASSERT_FALSE(scene);
+    EXPECT_THAT(scene.error().message, HasSubstr("table: got"));
+  }
+}
 
 TEST(GenerateChapter3, RefusesImpossibleCounts) {
   for (const int objects : {-1, 41, 1'000'000}) {

@@ -331,5 +331,82 @@ TEST_F(PbstoTest, PlansWithinTheLimitsEvenFromAnInitialCandidateBeyondThem) {
   }
 }
 
+TEST_F(PbstoTest, AsksForFullPhysicsUnlessItsOptionsSaySo) {
+  planned(problem(2));
+  for (const auto& batch : pool.batches) {
+    EXPECT_EQ(batch.fidelity, physics_pool::Fidelity{});
+    EXPECT_FALSE(batch.stop_hopeless);
+    EXPECT_TRUE(batch.law.draws.empty());
+  }
+  pool.batches.clear();
+  options.freeze = options.stop_hopeless = true;
+  planned(problem(2));
+  for (const auto& batch : pool.batches) {
+    EXPECT_EQ(batch.fidelity, (physics_pool::Fidelity{.freeze = true}));
+    EXPECT_TRUE(batch.stop_hopeless);
+  }
+}
+
+// Where long steps rank as well as the fine model, screening 4·2 draws and running
+// 2 of them again finds what running all 8 finds.
+TEST_F(PbstoTest, ScreeningByAPerfectRankFindsWhatTheWholeBatchFinds) {
+  options.rollouts = 8;
+  const Plan whole = planned(problem(6));
+  options.rollouts = 2;
+  options.screening = 4;
+  const Plan screened = planned(problem(6));
+  EXPECT_EQ(screened.controls, whole.controls);
+  EXPECT_EQ(screened.rollouts, 1u + 6 * (8 + 2));
+}
+
+TEST_F(PbstoTest, ScreensWithLongStepsAndChoosesWithTheFineModel) {
+  options.rollouts = 2;
+  options.screening = 4;
+  options.screening_time_step = 0.01;
+  options.freeze = true;
+  planned(problem(1));
+  ASSERT_EQ(pool.batches.size(), 3u);  // initial, screening, fine
+  const auto& coarse = pool.batches[1];
+  EXPECT_EQ(coarse.samples, 8u);
+  EXPECT_EQ(coarse.fidelity, (physics_pool::Fidelity{.freeze = true, .time_step = 0.01}));
+  EXPECT_FALSE(coarse.stop_losers);
+  const auto& fine = pool.batches[2];
+  EXPECT_EQ(fine.samples, 2u);
+  EXPECT_EQ(fine.fidelity, (physics_pool::Fidelity{.freeze = true}));
+  ASSERT_EQ(fine.law.draws.size(), 2u);
+  std::vector<std::pair<double, std::uint32_t>> ranked;
+  for (std::uint32_t k = 0; k < 8; ++k) ranked.emplace_back(pool.cost(sample_controls(coarse.nominal, coarse.law, k)), k);
+  std::ranges::sort(ranked);
+  EXPECT_THAT(fine.law.draws, testing::UnorderedElementsAre(ranked[0].second, ranked[1].second));
+}
+
+TEST_F(PbstoTest, TheFirstSuccessOfTheScreeningIsAlwaysRunAgain) {
+  pool.can_succeed = true;
+  options.rollouts = 1;
+  options.screening = 64;
+  options.objective.success_cost = 0.9 * pool.cost(problem(1).initial);
+  planned(problem(1));
+  ASSERT_EQ(pool.batches.size(), 3u);
+  const auto& coarse = pool.batches[1];
+  std::uint32_t first = 0;
+  while (pool.cost(sample_controls(coarse.nominal, coarse.law, first)) > options.objective.success_cost) ++first;
+  EXPECT_THAT(pool.batches[2].law.draws, testing::ElementsAre(first));
+}
+
+TEST_F(PbstoTest, ScreeningLeavesOutWhatDiverges) {
+  options.rollouts = 3;
+  options.screening = 2;
+  pool.diverges = [](const auto& batch, std::uint32_t sample) { return batch.fidelity.time_step > 0 && sample != 4; };
+  planned(problem(1));
+  ASSERT_EQ(pool.batches.size(), 3u);
+  EXPECT_THAT(pool.batches[2].law.draws, testing::ElementsAre(4u));
+  EXPECT_EQ(pool.batches[2].samples, 1u);
+
+  pool.batches.clear();
+  pool.diverges = [](const auto& batch, std::uint32_t) { return batch.fidelity.time_step > 0; };
+  EXPECT_EQ(planned(problem(2)).iterations, 2);
+  EXPECT_EQ(pool.batches.size(), 3u);  // nothing to run again
+}
+
 }  // namespace
 }  // namespace jostle::planners

@@ -8,6 +8,7 @@
 #include <array>
 
 #include "services/bench/benchmarks.hpp"
+#include "services/bench/cheap_physics.hpp"
 #include "services/support/files.hpp"
 #include "services/support/program.hpp"
 
@@ -29,7 +30,10 @@ constexpr std::array<Benchmark, 5> kBenchmarks{{
     {"scheduling", "waiting workers against workers that never idle", 5, measure_scheduling},
 }};
 
+constexpr const char* kCheapPhysics = "cheap-physics";
+
 int list() {
+  fmt::print("{:<14} {}\n", kCheapPhysics, "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers");
   for (const Benchmark& benchmark : kBenchmarks) fmt::print("{:<14} {}\n", benchmark.name, benchmark.purpose);
   return kExitOk;
 }
@@ -51,6 +55,15 @@ int perform(const Benchmark& benchmark, Settings settings, const std::string& js
   return agree ? kExitOk : kExitFailed;
 }
 
+int compare_levers(const Settings& settings, const std::string& json, const std::string& plot, int worlds) {
+  CheapPhysicsOptions options{.executed_worlds = worlds,
+                              .on_news = [](const std::string& line) { fmt::print(stderr, "{}\n", line); }};
+  if (settings.repeats > 0) options.repeats = settings.repeats;
+  const auto ok = bench_cheap_physics(options, {.json = json, .plot = plot}, data_file("experiments/grasping.yaml"),
+                                      settings.stop);
+  return ok ? kExitOk : fail(ok.error(), kExitBroken);
+}
+
 int start(const std::string& name, const Settings& settings, const std::string& json) {
   if (name == "list") return list();
   if (name == "echo") return serve_echo(settings.domain, settings.stop);
@@ -68,13 +81,17 @@ int start(const std::string& name, const Settings& settings, const std::string& 
 int main(int argc, char** argv) {
   using namespace jostle::services;
   CLI::App app("Measures the ratio of two ways to do the same work, in turns, on this machine.", "jostle bench");
-  std::string name, json;
+  std::string name, json, plot;
+  int worlds = CheapPhysicsOptions{}.executed_worlds;
   // Of its own, so that neither a user's system nor another benchmark is in the way.
   Settings settings{.workers = {64}, .domain = 100 + static_cast<int>(getpid() % 100)};
   app.add_option("name", name, "A benchmark, or `list`")->required();
   app.add_option("--repeats", settings.repeats, "Runs of each side (default: the benchmark's)")
       ->check(CLI::Range(1, 100'000));
   app.add_option("--json", json, "File for all numbers");
+  app.add_option("--plot", plot, "Of cheap-physics: PNG of cost against rollouts and against time");
+  app.add_option("--worlds", worlds, "Of cheap-physics: worlds of 15 objects that are planned and executed")
+      ->capture_default_str()->check(CLI::Range(1, 1000));
   app.add_option("--workers", settings.workers, "Of scheduling: worker processes, such as 8,16,64")
       ->capture_default_str()->delimiter(',')->check(CLI::Range(1, 1024));
   app.add_option("--domain", settings.domain, "DDS domain (default: one of 100 to 199, from the process id)")
@@ -85,6 +102,7 @@ int main(int argc, char** argv) {
   const StopSignal signal;
   settings.stop = signal.token();
   try {
+    if (name == kCheapPhysics) return compare_levers(settings, json, plot, worlds);
     return start(name, settings, json);
   } catch (const std::exception& error) {  // the middleware's SetupError, the engine's errors
     fmt::print(stderr, "jostle bench: {}\n", error.what());

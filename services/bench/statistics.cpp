@@ -36,4 +36,13 @@ Interval median_interval(std::vector<double> values) {
   return {values[outside], values[n - 1 - outside]};
 }
 
+Share wilson_interval(int successes, int runs) {
+  if (runs == 0) return {};
+  constexpr double z = 1.959964;  // 95 %
+  const double n = runs, p = successes / n;
+  const double centre = (p + z * z / (2 * n)) / (1 + z * z / n);
+  const double half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
+  return {.successes = successes, .runs = runs, .low = centre - half, .high = centre + half};
+}
+
 }  // namespace jostle::services

@@ -24,4 +24,11 @@ inline double median(std::vector<double> values) { return quantile(std::move(val
 ///          probability sum_{i<k} C(n,i)/2^n, whatever their distribution.
 Interval median_interval(std::vector<double> values);
 
+/// Success share of n runs with its 95 % Wilson interval.
+struct Share {
+  int successes = 0, runs = 0;
+  double low = 0.0, high = 1.0;
+};
+Share wilson_interval(int successes, int runs);
+
 }  // namespace jostle::services

@@ -192,15 +192,6 @@ std::vector<GraspingRun> run_study(const GraspingStudy& study, int jobs,
   return runs;
 }
 
-Share wilson_interval(int successes, int runs) {
-  if (runs == 0) return {};
-  constexpr double z = 1.959964;  // 95 %
-  const double n = runs, p = successes / n;
-  const double centre = (p + z * z / (2 * n)) / (1 + z * z / n);
-  const double half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
-  return {.successes = successes, .runs = runs, .low = centre - half, .high = centre + half};
-}
-
 std::string study_table(const GraspingStudy& study, const std::vector<GraspingRun>& runs) {
   std::string text = study.title + "\n\n";
   text += fmt::format("{:<8}{:<12}{:<10}{:<16}{:<9}{:<16}{:<18}{:<16}{}\n", "level", "controller",

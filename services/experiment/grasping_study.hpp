@@ -10,6 +10,7 @@
 
 #include "idl/types/result.hpp"
 #include "physics_pool/scene/generate.hpp"
+#include "services/bench/statistics.hpp"
 #include "services/config/parameters.hpp"
 
 namespace jostle::services {
@@ -44,13 +45,6 @@ struct GraspingRun {
 /// do not depend on `jobs`.
 std::vector<GraspingRun> run_study(const GraspingStudy& study, int jobs,
                                    const std::function<void(const GraspingRun&)>& on_run);
-
-/// Success share of n runs with its 95 % Wilson interval.
-struct Share {
-  int successes = 0, runs = 0;
-  double low = 0.0, high = 1.0;
-};
-Share wilson_interval(int successes, int runs);
 
 /// A table with one row per level and controller, beside the thesis's numbers.
 std::string study_table(const GraspingStudy& study, const std::vector<GraspingRun>& runs);

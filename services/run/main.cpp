@@ -32,7 +32,7 @@ Result<void> complete(const Arguments& arguments, RunOptions& options) {
   options.scene = std::move(scene_result).value();
   options.planning = physics_pool::perturb(options.scene, options.level, options.seed);
   const std::filesystem::path file =
-      arguments.parameters.empty() ? data_file("experiments/chapter3.yaml")
+      arguments.parameters.empty() ? data_file("experiments/grasping.yaml")
                                    : std::filesystem::path(arguments.parameters);
   auto parameters_result = read_text(file);
   if (!parameters_result) return parameters_result.error();
@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "Of all noise, the planner's and the world's")->capture_default_str();
   app.add_option("--pool", options.pool, "dds: worker processes; threads: threads of the coordinator")
       ->capture_default_str()->check(CLI::IsMember({"dds", "threads"}));
-  app.add_option("--parameters", arguments.parameters, "Planner's and controller's (default: experiments/chapter3.yaml)");
+  app.add_option("--parameters", arguments.parameters, "Planner's and controller's (default: experiments/grasping.yaml)");
   app.add_option("--json", options.json, "File for the result");
   app.add_option("--picture", options.picture, "PNG of the execution");
   app.add_option("--rate", options.rate, "World seconds per second while acting; 0: as fast as possible")

@@ -25,8 +25,9 @@ class Run : public RunFixture {
 
   // An honest search of several iterations; that no plan is good enough for
   // success makes it run them all.
-  std::string three_iterations() const {
-    return folder.write("three.yaml", "objective: {success_cost: 1.0e-9}\ncontrol: {many_iterations: 3}\n");
+  // Parameters of a planner that never succeeds.
+  std::string never_content(const std::string& planner) const {
+    return folder.write("never.yaml", "objective: {success_cost: 1.0e-9}\ncontrol: {many_iterations: 6}\n" + planner);
   }
 };
 
@@ -88,12 +89,15 @@ TEST_F(Run, WithoutWorkersOfItsOwnItTakesThoseOnTheDomain) {
   EXPECT_EQ(finish({easy, "--parameters", plain, "--plan-only", "--workers", "0"}), 0) << run->err();
 }
 
-TEST_F(Run, PlanIsTheSameForEveryPoolAndWhenAWorkerDies) {
+// With full physics, and with every lever that makes it cheaper.
+class RunWith : public Run, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(RunWith, PlanIsTheSameForEveryPoolAndWhenAWorkerDies) {
   struct Case {
     const char *pool, *workers;
     bool kill_one;
   };
-  const std::vector<std::string> task{easy, "--plan-only", "--parameters", three_iterations(), "--json",
+  const std::vector<std::string> task{easy, "--plan-only", "--parameters", never_content(GetParam()), "--json",
                                       result_file()};
   std::optional<json> first;
   for (const Case& c : {Case{"threads", "1", false}, Case{"threads", "2", false}, Case{"dds", "1", false},
@@ -113,7 +117,7 @@ TEST_F(Run, PlanIsTheSameForEveryPoolAndWhenAWorkerDies) {
 
     const json report = result();
     if (!first) first = report;
-    EXPECT_EQ(report["iterations"], 3);
+    EXPECT_EQ(report["iterations"], 6);
     EXPECT_EQ(report["plan_hash"], (*first)["plan_hash"]);
     EXPECT_EQ(report["cost"], (*first)["cost"]);
     EXPECT_EQ(report["rollouts"], (*first)["rollouts"]);
@@ -122,6 +126,11 @@ TEST_F(Run, PlanIsTheSameForEveryPoolAndWhenAWorkerDies) {
     }
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Physics, RunWith,
+                         ::testing::Values("planner: {rollouts: 8}\n",
+                                           "planner: {rollouts: 8, freeze: true, screening: 8, stop_hopeless: true}\n"),
+                         [](const auto& planner) { return planner.index == 0 ? "full" : "cheap"; });
 
 TEST_F(Run, WorkerStartedByHandJoinsAPlanThatRuns) {
   start_planning();

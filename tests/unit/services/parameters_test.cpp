@@ -42,7 +42,8 @@ TEST(Parameters, TakeEveryKey) {
   const Parameters sut = parsed(R"(
 step_duration: 0.5
 min_steps: 4
-planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], scales: [0.5, 2], update: cost-weighted, lambda: 9, stop_losers: false}
+planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], scales: [0.5, 2], update: cost-weighted, lambda: 9, stop_losers: false,
+          stop_hopeless: true, freeze: true, screening: 32, screening_time_step: 0.005}
 objective: {goal: 10, angle: 11, acceleration: 12, disturbance: 13, disturbance_rotation: 14, edge: 15, edge_rate: 16,
             edge_exponent_max: 17, edge_margin: 18, topple: 19, topple_angle: 20, drop: 21, drop_height: 22, success_cost: 23, obstruction: 24}
 control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, initial_steps: 27, straight_speed: 0.28,
@@ -60,6 +61,10 @@ control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, init
   EXPECT_EQ(sut.planner.update, planners::PbstoOptions::Update::kCostWeighted);
   EXPECT_EQ(sut.planner.lambda, 9);
   EXPECT_FALSE(sut.planner.stop_losers);
+  EXPECT_TRUE(sut.planner.stop_hopeless);
+  EXPECT_TRUE(sut.planner.freeze);
+  EXPECT_EQ(sut.planner.screening, 32);
+  EXPECT_EQ(sut.planner.screening_time_step, 0.005);
   const auto& o = sut.planner.objective;
   EXPECT_THAT((std::vector{o.goal, o.angle, o.acceleration, o.disturbance, o.disturbance_rotation, o.edge,
                            o.edge_rate, o.edge_exponent_max, o.edge_margin, o.topple, o.topple_angle, o.drop,
@@ -92,6 +97,8 @@ TEST_P(BadParameters, AreRefusedWithFileLineFieldGotAndWanted) {
 }
 
 const std::vector<Case> kCases{
+    {"NoScreening", "planner: {screening: 0}\n", {"planner.screening", "got 0", "1 to 10000"}},
+    {"LongScreeningStep", "planner: {screening_time_step: 0.1}\n", {"planner.screening_time_step", "got 0.1", "0.02"}},
     {"UnknownKey", "step_duration: 1\nsteps: 3\n", {"p.yaml:2", "steps", "unknown key", "min_steps"}},
     {"UnknownPlannerKey", "planner:\n  rollout: 3\n", {"p.yaml:2", "planner.rollout", "unknown key", "rollouts"}},
     {"UnknownObjectiveKey", "objective: {gaol: 3}\n", {"p.yaml:1", "objective.gaol", "unknown key", "goal"}},

@@ -14,13 +14,16 @@ void throw_error(const char* message) { throw EngineError(message); }
 // Warnings are counted in mjData::warning, which every rollout reads.
 void ignore_warning(const char*) {}
 
-bool is_surface(const mjModel* model, int geom) {
-  return model->nuser_geom > 0 && model->geom_user[geom * model->nuser_geom] == kSurfaceMark;
+double mark(const mjModel* model, int geom) {
+  return model->nuser_geom > 0 ? model->geom_user[geom * model->nuser_geom] : 0.0;
 }
 
-bool is_beyond_edge(const mjModel* model, const mjData* data, int surface, int geom) {
-  const mjtNum* half = model->geom_size + 3 * surface;
+// Whether a marked plane cannot meet a geom where its body is.
+bool is_out_of_reach(const mjModel* model, const mjData* data, int plane, int geom) {
+  constexpr double kDropped = -0.2;  // m; nothing on the surface has its centre so low
   const mjtNum* centre = data->xpos + 3 * model->geom_bodyid[geom];
+  if (mark(model, plane) == kFloorMark) return centre[2] > kDropped;
+  const mjtNum* half = model->geom_size + 3 * plane;
   return std::abs(centre[0]) > half[0] || std::abs(centre[1]) > half[1];
 }
 
@@ -29,8 +32,8 @@ int filter_contact(const mjModel* model, mjData* data, int a, int b) {
   const bool paired = (model->geom_contype[a] & model->geom_conaffinity[b]) != 0 ||
                       (model->geom_contype[b] & model->geom_conaffinity[a]) != 0;
   if (!paired) return 1;
-  if (is_surface(model, a)) return is_beyond_edge(model, data, a, b) ? 1 : 0;
-  if (is_surface(model, b)) return is_beyond_edge(model, data, b, a) ? 1 : 0;
+  if (mark(model, a) != 0.0) return is_out_of_reach(model, data, a, b) ? 1 : 0;
+  if (mark(model, b) != 0.0) return is_out_of_reach(model, data, b, a) ? 1 : 0;
   return 0;
 }
 

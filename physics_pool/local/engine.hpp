@@ -50,5 +50,7 @@ std::string divergence(const mjModel& model, const mjData& data);
 /// centre is above it. MuJoCo's planes are infinite, yet they give steadier
 /// contacts than boxes (four points under a cylinder instead of one).
 inline constexpr double kSurfaceMark = 1.0;
+/// Of the floor far below, where what has dropped ends: it meets nothing else.
+inline constexpr double kFloorMark = 2.0;
 
 }  // namespace jostle::physics_pool

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "physics_pool/local/engine.hpp"
 #include "physics_pool/scene/planar_gripper.hpp"
 
 namespace jostle::physics_pool {
@@ -83,10 +84,10 @@ void write_view(Writer& xml, const Surface& surface) {
 
 void write_surface(Writer& xml, const Surface& surface) {
   const double half_x = surface.size[0] / 2, half_y = surface.size[1] / 2;
-  xml.line(R"(<geom name="floor" type="plane" pos="0 0 {}" size="3 3 1" material="floor" contype="{}" conaffinity="0"/>)",
-           kFloor, kSupport);
-  xml.line(R"(<geom name="surface" type="plane" size="{} {} 1" rgba="0 0 0 0" contype="{}" conaffinity="0" user="1"/>)",
-           half_x, half_y, kSupport);
+  xml.line(R"(<geom name="floor" type="plane" pos="0 0 {}" size="3 3 1" material="floor" contype="{}" conaffinity="0" user="{}"/>)",
+           kFloor, kSupport, kFloorMark);
+  xml.line(R"(<geom name="surface" type="plane" size="{} {} 1" rgba="0 0 0 0" contype="{}" conaffinity="0" user="{}"/>)",
+           half_x, half_y, kSupport, kSurfaceMark);
   // What one sees of the table; the plane above is what things stand on.
   xml.line(R"(<geom name="table" type="box" pos="0 0 -0.02" size="{} {} 0.0199" material="wood" contype="0" conaffinity="0"/>)",
            half_x, half_y);

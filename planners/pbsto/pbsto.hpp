@@ -32,7 +32,7 @@ struct PbstoOptions {
   /// with long steps, the K cheapest again with the fine model, and the choice is
   /// made among those. 1 screens nothing.
   int screening = 1;
-  double screening_time_step = 0.01;  ///< s; longer is cheaper and ranks worse
+  double screening_time_step = 0.005;  ///< s; longer is cheaper and ranks worse
   physics_pool::Objective objective;
 };
 

@@ -67,11 +67,31 @@ Result<void> Search::consider(const ControlSequence& controls) {
   return {};
 }
 
+Result<void> Search::attempt(const std::function<Result<void>()>& step) {
+  Plan before = best_;
+  if (auto ok = step(); !ok) return ok;
+  if (!best_.grasped || pattern_.fidelity == physics_pool::Fidelity{}) return {};
+  RolloutBatch full = around(best_.controls);
+  std::ranges::fill(full.law.sigma, 0.0);
+  full.fidelity = {};
+  full.incumbent = physics_pool::kInfinity;
+  auto reply_result = run(full);
+  if (!reply_result) return reply_result.error();
+  const RolloutOutcome* truth = winner_of(*reply_result);
+  if (truth && (truth->end == End::kSucceeded || truth->cost < before.cost)) {
+    adopt(full, *reply_result);
+  } else {
+    before.rollouts = best_.rollouts;
+    best_ = std::move(before);
+  }
+  return {};
+}
+
 Result<Plan> Search::until_done(const std::function<Result<void>()>& improve) {
-  if (auto ok = consider(problem_.initial); !ok) return ok.error();
+  if (auto ok = attempt([this] { return consider(problem_.initial); }); !ok) return ok.error();
   report();
   while (best_.iterations < problem_.iterations && !best_.grasped) {
-    if (auto ok = improve(); !ok) return ok.error();
+    if (auto ok = attempt(improve); !ok) return ok.error();
     ++best_.iterations;
     report();
   }

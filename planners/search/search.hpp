@@ -38,11 +38,14 @@ class Search {
   Result<void> consider(const ControlSequence& controls);
 
   /// Scores the initial sequence, then improves it until a success or the last
-  /// iteration; tells on_progress after each.
+  /// iteration; tells on_progress after each. What reduced physics calls a success
+  /// counts when one rollout with full physics agrees; otherwise it is one more
+  /// candidate, at the cost that full physics gives it.
   /// Errors   those of `improve`, and of Planner::plan.
   Result<Plan> until_done(const std::function<Result<void>()>& improve);
 
  private:
+  Result<void> attempt(const std::function<Result<void>()>& step);
   void report() const;
 
   physics_pool::Pool& pool_;

@@ -60,6 +60,7 @@ class BowlPool final : public physics_pool::Pool {
   std::optional<std::size_t> fail_at;     ///< batches that go well before errors begin
   Code fail_code = Code::kUnavailable;
   std::function<bool(const physics_pool::RolloutBatch&, std::uint32_t)> diverges;
+  std::function<double(const physics_pool::RolloutBatch&)> extra;  ///< cost on top, in the last step
 
   std::vector<physics_pool::RolloutBatch> batches;
   std::vector<physics_pool::TimePoint> deadlines;
@@ -74,6 +75,7 @@ class BowlPool final : public physics_pool::Pool {
     physics_pool::RolloutOutcome outcome{.sample = sample, .end = End::kCompleted};
     outcome.step_costs = step_costs(controls);
     outcome.steps = static_cast<std::uint32_t>(controls.steps());
+    if (extra && !outcome.step_costs.empty()) outcome.step_costs.back() += extra(batch);
     outcome.cost = std::accumulate(outcome.step_costs.begin(), outcome.step_costs.end(), 0.0);
     State x = batch.x0;
     outcome.trajectory.push_back(x);

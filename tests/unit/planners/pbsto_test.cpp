@@ -408,5 +408,48 @@ TEST_F(PbstoTest, ScreeningLeavesOutWhatDiverges) {
   EXPECT_EQ(pool.batches.size(), 3u);  // nothing to run again
 }
 
+bool is_full(const physics_pool::RolloutBatch& batch) { return batch.fidelity == physics_pool::Fidelity{}; }
+
+TEST_F(PbstoTest, SuccessOfReducedPhysicsCountsOnceFullPhysicsAgrees) {
+  pool.can_succeed = true;
+  options.freeze = true;
+  options.objective.success_cost = 0.5 * pool.cost(problem(1).initial);
+  const Plan plan = planned(problem(50));
+  EXPECT_TRUE(plan.grasped);
+  EXPECT_TRUE(is_full(pool.batches.back()));
+  EXPECT_EQ(pool.batches.back().samples, 1u);
+  EXPECT_EQ(std::ranges::count_if(pool.batches, is_full), 1);
+  EXPECT_EQ(plan.controls, sample_controls(pool.batches.back().nominal, pool.batches.back().law, 0));
+}
+
+TEST_F(PbstoTest, SuccessThatFullPhysicsDeniesIsOneMoreCandidate) {
+  pool.can_succeed = true;
+  options.freeze = true;
+  const double start = pool.cost(problem(1).initial);
+  options.objective.success_cost = 0.5 * start;
+  pool.extra = [=](const auto& batch) { return is_full(batch) ? 10 * start : 0.0; };
+  const Plan plan = planned(problem(10));
+  EXPECT_FALSE(plan.grasped);
+  EXPECT_EQ(plan.iterations, 10);
+  EXPECT_LT(plan.cost, 10 * start);  // the denied ones were not kept
+  EXPECT_GT(std::ranges::count_if(pool.batches, is_full), 1);
+  for (std::size_t i = 1; i < news.size(); ++i) EXPECT_LE(news[i].cost, news[i - 1].cost);
+  EXPECT_EQ(news.back().rollouts, plan.rollouts);
+}
+
+TEST_F(PbstoTest, DeniedSuccessThatIsStillBetterIsKeptAtItsTrueCost) {
+  pool.can_succeed = true;
+  options.freeze = true;
+  const double start = pool.cost(problem(1).initial);
+  options.objective.success_cost = 0.6 * start;
+  pool.extra = [=](const auto& batch) { return is_full(batch) ? 0.2 * start : 0.0; };
+  planned(problem(12));
+  bool kept = false;
+  for (std::size_t i = 1; i < news.size(); ++i) {
+    kept = kept || (!news[i].grasped && news[i].cost > options.objective.success_cost && news[i].cost < news[i - 1].cost);
+  }
+  EXPECT_TRUE(kept);
+}
+
 }  // namespace
 }  // namespace jostle::planners

@@ -420,7 +420,8 @@ Result<std::vector<Curve>> compare_peers(Pool& pool, const PbstoOptions& shipped
       scenes.push_back(std::move(scene_result).value());
     }
   }
-  const ConvergenceOptions convergence{.steps = options.control.initial_steps,
+  const ConvergenceOptions convergence{.rollouts = options.peer_rollouts,
+                                       .steps = options.control.initial_steps,
                                        .step_duration = shipped.step_duration,
                                        .fidelity = last_choice(shipped),
                                        .objective = shipped.objective};
@@ -446,13 +447,13 @@ Result<void> bench_cheap_physics(CheapPhysicsOptions options, const CheapPhysics
   auto results = measure_cheap_physics(pool, options, stop);
   if (!results) return results.error();
   fmt::print("{}", to_text(*results));
+  nlohmann::json json = to_json(*results);
+  const auto save = [&] { return files.json.empty() ? Result<void>{} : write_text(files.json, json.dump(1) + "\n"); };
+  if (auto ok = save(); !ok) return ok;  // before the peers: half of an hour is worth keeping
   auto curves_result = compare_peers(pool, shipped, options, stop);
   if (!curves_result) return curves_result.error();
-  nlohmann::json json = to_json(*results);
   json["peers"] = to_json(*curves_result)["curves"];
-  if (!files.json.empty()) {
-    if (auto ok = write_text(files.json, json.dump(1) + "\n"); !ok) return ok;
-  }
+  if (auto ok = save(); !ok) return ok;
   return files.plot.empty() ? Result<void>{} : plot_convergence(*curves_result, files.plot);
 }
 

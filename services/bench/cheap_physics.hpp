@@ -34,12 +34,13 @@ struct CheapPhysicsOptions {
   std::vector<int> sizes{5, 10, 15, 40};  ///< objects beside the target
   int worlds = 3;                      ///< of each size, seeds 1 to this
   int repeats = 3;                     ///< of each world's speed measurement
-  int iterations = 3;                  ///< of a planner whose speed is measured
-  std::uint32_t samples = 24;          ///< per world, whose costs and poses are compared
+  int iterations = 2;                  ///< of a planner whose speed is measured
+  std::uint32_t samples = 16;          ///< per world, whose costs and poses are compared
   int executed_objects = 15;           ///< of the worlds that are planned and executed
   int executed_worlds = 20;            ///< seeds 1 to this
   std::vector<physics_pool::Scene> demo;  ///< planned only, with each of demo_seeds
   int demo_seeds = 5;
+  std::uint64_t peer_rollouts = 200;   ///< of each peer in each world
   std::function<void(const std::string&)> on_news;  ///< a line now and then
 };
 

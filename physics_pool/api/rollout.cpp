@@ -164,13 +164,7 @@ Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, doub
   if (batch.nominal.nu != layout.nu) {
     return wrong("nominal.nu", std::to_string(batch.nominal.nu), std::to_string(layout.nu));
   }
-  if (batch.fidelity.time_step > 0) {
-    if (batch.fidelity.time_step < time_step) {
-      return wrong("fidelity.time_step", fmt::format("{} s", batch.fidelity.time_step),
-                   fmt::format("0, or the world's {} s or more", time_step));
-    }
-    time_step = batch.fidelity.time_step;
-  }
+  time_step = std::max(time_step, batch.fidelity.time_step);
   const double steps = batch.step_duration / time_step;
   if (steps < 0.5 || std::abs(steps - std::round(steps)) > 1e-6 * steps) {
     return wrong("step_duration", fmt::format("{} s", batch.step_duration),

@@ -54,8 +54,8 @@ struct Fidelity {
   /// Objects that stand still have no freedom until something touches them. The
   /// touch is found before it has any effect, and the object is free from there on.
   bool freeze = false;
-  /// Engine step, s; 0 is the world's own. Longer is cheaper and less exact: for
-  /// screening. Drives are softened where they would be unstable.
+  /// Engine step, s, where it is longer than the world's own: cheaper and less
+  /// exact, for screening. Drives are softened where they would be unstable.
   double time_step = 0.0;
 
   bool operator==(const Fidelity&) const = default;

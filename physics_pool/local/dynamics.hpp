@@ -33,7 +33,7 @@ class Dynamics {
   virtual double time_step() const = 0;  ///< s
 
   /// Runs `engine_steps` from x under u. `interrupted` is asked before each step;
-  /// may be empty.
+  /// may be empty. After an interruption or a divergence x is of no use.
   virtual Advance advance(State& x, std::span<const double> u, int engine_steps,
                           const std::function<bool()>& interrupted = {}) = 0;
 };

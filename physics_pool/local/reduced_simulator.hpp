@@ -19,16 +19,17 @@ namespace jostle::physics_pool {
 /// model that has one freedom more, and the step begins anew. So nothing is ever
 /// pushed against something that ought to have yielded.
 ///
-/// What differs from the fine model: a frozen object does not creep or settle, and
-/// the solver's warm start is reset when an object is freed. Everything free, and
+/// What differs from the fine model: frozen objects do not creep, settle, or push
+/// each other apart where they overlap, and the solver's warm start is reset when
+/// an object is freed. Everything free, and
 /// the world's own time step, is the fine model bit for bit.
 ///
 /// Models are made per number of free objects, not per set of them: which objects
 /// they are is a matter of sizes, masses and frictions, written into this thread's
 /// copy of the model.
 ///
-/// Threads  one at a time. Allocates when a number of free objects occurs for the
-///          first time, and never again.
+/// Threads  one at a time. Allocates when a number of free objects occurs that has
+///          no model, which is for the first time, or again if there were many.
 class ReducedSimulator final : public Dynamics {
  public:
   ReducedSimulator(WorldPtr world, const Fidelity& fidelity);
@@ -45,6 +46,7 @@ class ReducedSimulator final : public Dynamics {
 
   void freeze(const State& x);
   Part& enter(const State& x, std::span<const double> u);
+  void drop_remotest(int count);
   int thaw_touched(const Part& part);
   void run(Advance& result, State& x, std::span<const double> u, int engine_steps,
            const std::function<bool()>& interrupted);

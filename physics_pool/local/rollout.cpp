@@ -83,13 +83,13 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
       outcome.step_costs.back() += goal;
     }
     if (last || !batch.stop_losers) continue;
-    Outlook ahead;
-    if (batch.stop_hopeless) {
-      ahead = outlook(geometry, objective, controls, t + 1, u, x, batch.step_duration);
-    }
-    const bool can_succeed = batch.stop_on_success && sum <= objective.success_cost && ahead.may_grasp;
-    const double least = sum + ahead.cost;
-    if (!can_succeed && (least >= batch.incumbent || least > signals.best())) return finish(End::kLost);
+    const bool can_succeed = batch.stop_on_success && sum <= objective.success_cost;
+    if (!can_succeed && (sum >= batch.incumbent || sum > signals.best())) return finish(End::kLost);
+    // Never against a sibling, whose news come sooner or later: should the bound's
+    // assumption fail, the plan is another one, but the same one everywhere.
+    if (!batch.stop_hopeless) continue;
+    const Outlook ahead = outlook(geometry, objective, controls, t + 1, u, x, batch.step_duration);
+    if (!(can_succeed && ahead.may_grasp) && sum + ahead.cost >= batch.incumbent) return finish(End::kLost);
   }
   signals.offer_cost(sum);
   return finish(End::kCompleted);

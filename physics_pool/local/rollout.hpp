@@ -45,8 +45,8 @@ class BatchSignals {
 /// A rollout stops as lost only when its running sum has reached the incumbent
 /// or passed the best sibling, and is above the cost at which it could still
 /// succeed: costs are >= 0, so it can neither win nor succeed any more. With
-/// `stop_hopeless` the sum includes what is certain to come (bound.hpp). When
-/// siblings' news arrive is a matter of timing; who wins is not.
+/// `stop_hopeless` what is bound to come (bound.hpp) is added for the comparison
+/// with the incumbent. When siblings' news arrive is a matter of timing; who wins is not.
 ///
 /// An obsolete rollout (cancelled, or a lower index succeeded) ends as kSkipped.
 RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::uint32_t sample,

@@ -16,17 +16,18 @@ struct Outlook {
   bool may_grasp = true;  ///< the target can still come into the pre-grasp region
 };
 
-/// Known for certain: the changes of control, and that what has dropped stays down.
-/// Of the goal's cost: distance shrinks no faster than hand and target can approach
+/// Certain are the changes of control, and that what has dropped stays down. Of the
+/// goal's cost: distance shrinks no faster than hand and target can approach
 /// each other,
 ///
 ///   d_T(end) >= d_T - sum_s (2·a_s + w_s·(d_T + a_0 + … + a_s) + f_s)·Delta_t
 ///
 /// with a_s the hand's speed in step s, w_s its rate of turning and f_s the speed of
 /// a finger, each the larger of what is commanded and what was commanded before (a
-/// drive never overshoots). Assumes that the target moves no faster than the hand
-/// and what turns with it at the target's distance would; nothing in a scene
-/// moves but what the hand has pushed, and contacts do not bounce.
+/// drive never overshoots). This assumes that the target moves no faster than the
+/// hand and what turns with it at the target's distance would. A target that is
+/// squeezed out of a wedge or flung by a lever could; none of some thousand random
+/// pushes did (bound_test.cpp, and equal plans in `jostle bench cheap-physics`).
 ///
 /// `u_before`: control before step `done`.
 Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls,

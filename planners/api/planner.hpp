@@ -36,6 +36,7 @@ struct Plan {
   bool grasped = false;
   int iterations = 0;
   std::uint64_t rollouts = 0;
+  int denials = 0;  ///< successes of reduced physics that full physics denied
 };
 
 /// Progress of a running plan, once per iteration.

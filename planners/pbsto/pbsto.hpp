@@ -26,7 +26,7 @@ struct PbstoOptions {
   int min_steps = 2;           ///< n_min of Alg. 1
   double step_duration = 1.0;  ///< Delta_t, s
   bool stop_losers = true;     ///< never changes the plan, only its price
-  bool stop_hopeless = false;  ///< likewise; see objective/bound.hpp
+  bool stop_hopeless = false;  ///< sooner still, on the assumption of objective/bound.hpp
   bool freeze = false;         ///< objects at rest have no freedom until touched (Fidelity)
   /// Candidates screened for each of the K rollouts: K·screening are drawn and run
   /// with long steps, the K cheapest again with the fine model, and the choice is

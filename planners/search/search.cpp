@@ -52,7 +52,8 @@ void Search::adopt(const RolloutBatch& batch, const BatchReply& reply) {
   const RolloutOutcome* winner = winner_of(reply);
   if (!winner) return;
   best_.controls = physics_pool::sample_controls(batch.nominal, batch.law, winner->sample);
-  best_.controls.truncate(static_cast<int>(winner->steps));  // a success may come early
+  // A success may come early; one of reduced physics may have to go on.
+  if (batch.fidelity == physics_pool::Fidelity{}) best_.controls.truncate(static_cast<int>(winner->steps));
   best_.states = winner->trajectory;
   best_.cost = winner->cost;
   best_.grasped = winner->grasped && winner->cost <= pattern_.objective.success_cost;
@@ -78,6 +79,7 @@ Result<void> Search::attempt(const std::function<Result<void>()>& step) {
   auto reply_result = run(full);
   if (!reply_result) return reply_result.error();
   const RolloutOutcome* truth = winner_of(*reply_result);
+  if (!truth || truth->end != End::kSucceeded) ++best_.denials, ++before.denials;
   if (truth && (truth->end == End::kSucceeded || truth->cost < before.cost)) {
     adopt(full, *reply_result);
   } else {

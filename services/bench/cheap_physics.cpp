@@ -245,11 +245,12 @@ class Study {
   }
 
   Result<void> measure_success(const Task& task, int objects) {
+    const int most = objects > options_.executed_objects ? options_.large_iterations : options_.control.many_iterations;
     std::optional<TimedPlan> first;
     std::string line;
     for (std::size_t i = 0; i < options_.levers.size(); ++i) {
       const PbstoOptions& lever = options_.levers[i].options;
-      auto timed_result = timed_plan(pool_, lever, task.problem(options_.control, options_.control.many_iterations), stop_);
+      auto timed_result = timed_plan(pool_, lever, task.problem(options_.control, most), stop_);
       if (!timed_result) return timed_result.error();
       const Plan& plan = timed_result->plan;
       if (!first) first = *timed_result;
@@ -258,6 +259,7 @@ class Study {
       ++result.worlds;
       result.planned += plan.grasped ? 1 : 0;
       result.executed += executed ? 1 : 0;
+      result.denials += plan.denials;
       result.same_plans += plan.controls == first->plan.controls ? 1 : 0;
       if (plan.grasped && first->plan.grasped) result.time_ratios.push_back(first->seconds / timed_result->seconds);
       line += fmt::format("  {} {} {:.1f} s", options_.levers[i].name,
@@ -314,7 +316,7 @@ nlohmann::json number_or_null(const std::optional<double>& value) {
   return value ? nlohmann::json(*value) : nlohmann::json();
 }
 
-// Median demo times of one lever; a search that found nothing counts with its time.
+// Of one lever, by seed; a search that found nothing counts with its time.
 std::vector<double> demo_seconds(const CheapPhysics& results, const std::string& lever) {
   std::vector<double> seconds;
   for (const DemoPlan& plan : results.demo) {
@@ -355,7 +357,7 @@ Result<CheapPhysics> measure_cheap_physics(Pool& pool, const CheapPhysicsOptions
 std::string to_text(const CheapPhysics& results) {
   std::string text = fmt::format("{:<11}{:>7}  {:<22}{:<8}{:<20}{:<24}{:<16}{}\n", "lever", "objects",
                                  "candidates/s, ratio", "rank", "pose error, mm", "success (95 %)", "time to plan",
-                                 "same plan");
+                                 "denied  same plan");
   for (const LeverResult& r : results.levers) {
     const Interval interval = r.ratios.empty() ? Interval{} : median_interval(r.ratios);
     const auto rank = median_or_none(r.correlations), time = median_or_none(r.time_ratios);
@@ -366,7 +368,7 @@ std::string to_text(const CheapPhysics& results) {
         rank ? fmt::format("{:.2f}", *rank) : "",
         r.pose_errors.empty() ? "" : fmt::format("{:.2f}, 90 % {:.1f}", 1e3 * median(r.pose_errors), 1e3 * quantile(r.pose_errors, 0.9)),
         r.worlds ? fmt::format("{}/{} ({:.2f} .. {:.2f})", r.executed, r.worlds, share.low, share.high) : "",
-        time ? fmt::format("{:.2f} x faster", *time) : "", r.worlds ? fmt::format("{}/{}", r.same_plans, r.worlds) : "");
+        time ? fmt::format("{:.2f} x faster", *time) : "", r.worlds ? fmt::format("{:<8}{}/{}", r.denials, r.same_plans, r.worlds) : "");
   }
   for (const LeverResult& r : results.levers) {
     const std::vector<double> seconds = demo_seconds(results, r.name);
@@ -400,6 +402,7 @@ nlohmann::json to_json(const CheapPhysics& results) {
          {"worlds", r.worlds},
          {"plan_time_ratio", number_or_null(median_or_none(r.time_ratios))},
          {"plan_time_ratios", r.time_ratios},
+         {"denials", r.denials},
          {"same_plans", r.same_plans}});
   }
   for (const DemoPlan& plan : results.demo) {

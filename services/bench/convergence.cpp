@@ -14,7 +14,7 @@
 #include "planners/pbsto/pbsto.hpp"
 #include "planners/sampling/sampling.hpp"
 #include "services/bench/plot.hpp"
-#include "services/bench/statistics.hpp"
+#include "services/support/statistics.hpp"
 
 namespace jostle::services {
 

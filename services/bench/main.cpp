@@ -103,6 +103,10 @@ int main(int argc, char** argv) {
   settings.stop = signal.token();
   try {
     if (name == kCheapPhysics) return compare_levers(settings, json, plot, worlds);
+    if (app.count("--plot") + app.count("--worlds") > 0) {
+      fmt::print(stderr, "jostle bench: --plot, --worlds: got '{}', wanted {}\n", name, kCheapPhysics);
+      return kExitUsage;
+    }
     return start(name, settings, json);
   } catch (const std::exception& error) {  // the middleware's SetupError, the engine's errors
     fmt::print(stderr, "jostle bench: {}\n", error.what());

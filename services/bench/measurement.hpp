@@ -11,7 +11,7 @@
 
 #include "idl/types/hash.hpp"
 #include "idl/types/result.hpp"
-#include "services/bench/statistics.hpp"
+#include "services/support/statistics.hpp"
 
 namespace jostle::services {
 

@@ -103,6 +103,17 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
     return Error{Code::kInvalidArgument, fmt::format("{}: {}: got {}, wanted {} to {}", origin, range.key,
                                                      range.value, range.low, range.high)};
   }
+  if (double(planner.rollouts) * planner.screening > physics_pool::kMaxSamples) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: planner.rollouts times planner.screening: got {}, wanted at most {}", origin,
+                             double(planner.rollouts) * planner.screening, physics_pool::kMaxSamples)};
+  }
+  const double steps = planner.step_duration / planner.screening_time_step;
+  if (planner.screening > 1 && std::abs(steps - std::round(steps)) > 1e-6 * steps) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: planner.screening_time_step: got {} s, wanted a part of step_duration, {} s, "
+                             "without remainder", origin, planner.screening_time_step, planner.step_duration)};
+  }
   return {};
 }
 

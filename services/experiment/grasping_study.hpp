@@ -10,7 +10,7 @@
 
 #include "idl/types/result.hpp"
 #include "physics_pool/scene/generate.hpp"
-#include "services/bench/statistics.hpp"
+#include "services/support/statistics.hpp"
 #include "services/config/parameters.hpp"
 
 namespace jostle::services {

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstddef>
 #include <cstring>
 #include <thread>
 #include <utility>
@@ -19,7 +20,11 @@ constexpr std::chrono::milliseconds kRetry{20};
 
 Result<DomainClaim> DomainClaim::take(const std::string& role, int domain, std::chrono::milliseconds patience) {
   const int handle = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (handle < 0) return Error{Code::kUnavailable, fmt::format("domain {}: {}", domain, std::strerror(errno))};
+  const auto failed = [&](const char* what) {
+    return Error{Code::kUnavailable, fmt::format("domain {}: the claim to be its only {} could not be made: {}: {}",
+                                                 domain, role, what, std::strerror(errno))};
+  };
+  if (handle < 0) return failed("socket");
   DomainClaim claim(handle);
   sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
   // A leading zero: a name in the kernel, not a file.
@@ -28,13 +33,10 @@ Result<DomainClaim> DomainClaim::take(const std::string& role, int domain, std::
   const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
   const auto deadline = std::chrono::steady_clock::now() + patience;
   while (bind(handle, reinterpret_cast<const sockaddr*>(&address), length) != 0) {
-    const int problem = errno;
-    if (problem != EADDRINUSE || std::chrono::steady_clock::now() >= deadline) {
-      return Error{Code::kUnavailable,
-                   problem == EADDRINUSE
-                       ? fmt::format("domain {}: got another {} on this machine, wanted none; "
-                                     "set ROS_DOMAIN_ID to a free one", domain, role)
-                       : fmt::format("domain {}: {}", domain, std::strerror(problem))};
+    if (errno != EADDRINUSE) return failed("bind");
+    if (std::chrono::steady_clock::now() >= deadline) {
+      return Error{Code::kUnavailable, fmt::format("domain {}: got another {} on this machine, wanted none; "
+                                                   "set ROS_DOMAIN_ID to a free one", domain, role)};
     }
     std::this_thread::sleep_for(kRetry);
   }

@@ -16,7 +16,7 @@ namespace jostle::services {
 /// exactly as far as loopback traffic does, the network namespace.
 class DomainClaim {
  public:
-  /// Waits up to `patience` for a predecessor that is just ending.
+  /// `role`: a few words. Waits up to `patience` for a predecessor that is just ending.
   /// Error kUnavailable if another process has the role.
   static Result<DomainClaim> take(const std::string& role, int domain, std::chrono::milliseconds patience);
 

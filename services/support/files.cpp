@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <sstream>
 
@@ -42,9 +44,12 @@ Result<void> write_text(const fs::path& file, const std::string& text) {
 }
 
 Result<fs::path> make_temporary_folder(const std::string& purpose) {
-  std::string name = (fs::temp_directory_path() / fmt::format("jostle-{}-XXXXXX", purpose)).string();
+  std::error_code problem;
+  const fs::path parent = fs::temp_directory_path(problem);
+  if (problem) return Error{Code::kIo, fmt::format("TMPDIR: got '{}', wanted a folder", parent.string())};
+  std::string name = (parent / fmt::format("jostle-{}-XXXXXX", purpose)).string();
   if (mkdtemp(name.data())) return fs::path(name);
-  return Error{Code::kIo, fmt::format("{}: cannot be made", name)};
+  return Error{Code::kIo, fmt::format("{}: cannot be made: {}", name, std::strerror(errno))};
 }
 
 }  // namespace jostle::services

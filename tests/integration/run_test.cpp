@@ -23,9 +23,8 @@ class Run : public RunFixture {
 
   json result() const { return json::parse(contents(result_file()), nullptr, false); }
 
-  // An honest search of several iterations; that no plan is good enough for
-  // success makes it run them all.
-  // Parameters of a planner that never succeeds.
+  // Parameters of an honest search of several iterations; that no plan is good
+  // enough for success makes it run them all.
   std::string never_content(const std::string& planner) const {
     return folder.write("never.yaml", "objective: {success_cost: 1.0e-9}\ncontrol: {many_iterations: 6}\n" + planner);
   }

@@ -57,6 +57,7 @@ class BowlPool final : public physics_pool::Pool {
 
   double scale = 1000.0;
   bool can_succeed = false;               ///< success where the total is at most the objective's
+  std::optional<int> success_steps;       ///< after which a success ends; else all
   std::optional<std::size_t> fail_at;     ///< batches that go well before errors begin
   Code fail_code = Code::kUnavailable;
   std::function<bool(const physics_pool::RolloutBatch&, std::uint32_t)> diverges;
@@ -86,6 +87,11 @@ class BowlPool final : public physics_pool::Pool {
     if (can_succeed && batch.stop_on_success && outcome.cost <= batch.objective.success_cost) {
       outcome.end = End::kSucceeded;
       outcome.grasped = true;
+      if (success_steps) {
+        outcome.steps = static_cast<std::uint32_t>(*success_steps);
+        outcome.step_costs.resize(outcome.steps);
+        outcome.trajectory.resize(outcome.steps + 1);
+      }
     }
     return outcome;
   }

@@ -72,6 +72,8 @@ TEST(CheapPhysics, ComparesEveryLeverWithFullPhysics) {
   ASSERT_EQ(results->levers.size(), 5u);
   const LeverResult &plain = results->levers[0], &hopeless = results->levers[3];
   EXPECT_EQ(plain.name, "plain");
+  ASSERT_FALSE(plain.ratios.empty());
+  ASSERT_FALSE(plain.pose_errors.empty());
   EXPECT_THAT(plain.ratios, testing::Each(1.0));
   EXPECT_THAT(plain.pose_errors, testing::Each(0.0));
   EXPECT_EQ(plain.executed, plain.planned);  // the full model predicts itself

@@ -126,7 +126,6 @@ const std::vector<Case> kCases{
     {"NegativeTimeStep", [](B& b) { b.fidelity.time_step = -0.1; }, "fidelity.time_step", "-0.1", "at most 0.02"},
     {"NaNTimeStep", [](B& b) { b.fidelity.time_step = kNaN; }, "fidelity.time_step", "nan", "at most 0.02"},
     {"LongTimeStep", [](B& b) { b.fidelity.time_step = 0.05; }, "fidelity.time_step", "0.05", "at most 0.02"},
-    {"ShortTimeStep", [](B& b) { b.fidelity.time_step = 1e-9; }, "fidelity.time_step", "1e-09", "0.002 s or more"},
     {"OddTimeStep", [](B& b) { b.fidelity.time_step = 0.003; b.step_duration = 0.5; }, "step_duration", "0.5 s", "0.003 s"},
     {"NoScales", [](B& b) { b.law.scales.clear(); }, "law.scales", "0 values", "1 to"},
     {"NaNScale", [](B& b) { b.law.scales = {1, kNaN}; }, "law.scales[1]", "nan", ">= 0"},
@@ -145,6 +144,7 @@ TEST(ValidateBatch, AcceptsTheLimitsThemselves) {
   batch.first_sample = UINT32_MAX - kMaxSamples;
   batch.wait = kMaxWait;
   batch.incumbent = -1e9;
+  batch.fidelity.time_step = 1e-9;  // the world's own is longer
   const auto ok = validate(batch, layout(), kTimeStep);
   EXPECT_TRUE(ok) << ok.error().message;
 }

@@ -1,5 +1,6 @@
 #include "physics_pool/local/reduced_simulator.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -121,6 +122,40 @@ TEST(ReducedSimulator, LongStepsKeepTheDrivesStable) {
   }
 }
 
+// A dozen boxes that reach a little into the arm: more contacts at once than a model
+// without free objects has room for.
+TEST(ReducedSimulator, SurvivesAHandThatStandsAmidManyObjects) {
+  Scene scene = tests::target_only();
+  scene.objects.clear();
+  for (int i = 0; i < 6; ++i) {
+    scene.objects.push_back(tests::box(fmt::format("left{}", i), -0.46 - 0.045 * i, 0.062));
+    scene.objects.push_back(tests::box(fmt::format("right{}", i), -0.46 - 0.045 * i, -0.062));
+  }
+  scene.surface.size = {1.6, 0.6};
+  scene.objects[0].name = "target";
+  scene.robot.x = -0.33;
+  ReducedSimulator sut(compile(scene), kFrozen);
+  State x = initial_state(scene);
+  const Advance advance = sut.advance(x, std::array{0.0, 0.0, 0.0, 0.0}, kSecond / 10);
+  EXPECT_EQ(advance.diverged, "");
+  EXPECT_GE(advance.thawed, 8u);
+}
+
+// As many models as there can be numbers of free objects, and then the first again.
+TEST(ReducedSimulator, DependsOnStateAloneWhenModelsWereDropped) {
+  const WorldPtr world = compile(clutter(20, 2));
+  ReducedSimulator sut(world, kFrozen);
+  const auto spun = [&](std::size_t count) {
+    State x = initial_state(world->scene());
+    for (std::size_t i = 0; i < count; ++i) x.v[static_cast<std::size_t>(world->geometry().layout.objects[i].v) + 5] = 1.0;
+    (void)sut.advance(x, std::array{0.0, 0.0, 0.0, 0.0}, 20);
+    return x;
+  };
+  std::vector<State> first;
+  for (std::size_t count = 0; count <= 21; ++count) first.push_back(spun(count));
+  for (const std::size_t count : {0u, 21u, 10u, 3u, 20u}) EXPECT_EQ(spun(count), first[count]);
+}
+
 TEST(ReducedSimulator, StopsWhenInterrupted) {
   const WorldPtr world = compile(tests::three_objects());
   ReducedSimulator sut(world, kFrozen);
@@ -146,6 +181,7 @@ TEST(StandsStill, OnlyOnTheSurfaceUprightAndAtRest) {
   EXPECT_FALSE(after([&](State& x) { x.v[v + 4] = -0.1; }));
   EXPECT_FALSE(after([&](State& x) { x.q[q + 2] += 0.01; }));
   EXPECT_FALSE(after([&](State& x) { x.q[q + 3] = std::cos(0.05), x.q[q + 4] = std::sin(0.05); }));
+  EXPECT_FALSE(after([&](State& x) { x.q[q + 1] = geometry.half_y + 0.001; }));
   EXPECT_TRUE(after([&](State& x) { x.q[q + 3] = std::cos(0.7), x.q[q + 6] = std::sin(0.7); }));  // a turn about z
 }
 
@@ -212,6 +248,10 @@ TEST_F(RandomPushes, FindEveryTouchAndAgreeWithTheFullModelWhereNothingIsTouched
     ReducedSimulator sut(world, kFrozen);
     for (std::uint32_t sample = 0; sample < 21; ++sample) {
       const Rollout rollout = push(world, sut, *data, sample);
+      if (sample % 7 == 3) {  // what ran before in the same models must not matter
+        ReducedSimulator fresh(world, kFrozen);
+        EXPECT_EQ(push(world, fresh, *data, sample).end, rollout.end);
+      }
       ++rollouts;
       with_touches += rollout.thawed > 0 ? 1 : 0;
     }

@@ -437,6 +437,21 @@ TEST_F(PbstoTest, SuccessThatFullPhysicsDeniesIsOneMoreCandidate) {
   EXPECT_EQ(news.back().rollouts, plan.rollouts);
 }
 
+TEST_F(PbstoTest, DeniedSuccessDoesNotShortenTheHorizon) {
+  pool.can_succeed = true;
+  pool.success_steps = 2;  // of three
+  options.freeze = true;
+  const double start = pool.cost(problem(1).initial);
+  options.objective.success_cost = 0.8 * start;
+  pool.extra = [=](const auto& batch) { return is_full(batch) ? 0.1 * start : 0.0; };  // denied, yet cheaper
+  const Plan plan = planned(problem(3));
+  EXPECT_GT(plan.denials, 0);
+  for (const auto& batch : pool.batches) EXPECT_EQ(batch.nominal.steps(), 3);
+  if (!plan.grasped) {
+    EXPECT_EQ(plan.controls.steps(), 3);
+  }
+}
+
 TEST_F(PbstoTest, DeniedSuccessThatIsStillBetterIsKeptAtItsTrueCost) {
   pool.can_succeed = true;
   options.freeze = true;

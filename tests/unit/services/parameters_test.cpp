@@ -99,6 +99,8 @@ TEST_P(BadParameters, AreRefusedWithFileLineFieldGotAndWanted) {
 const std::vector<Case> kCases{
     {"NoScreening", "planner: {screening: 0}\n", {"planner.screening", "got 0", "1 to 10000"}},
     {"LongScreeningStep", "planner: {screening_time_step: 0.1}\n", {"planner.screening_time_step", "got 0.1", "0.02"}},
+    {"OddScreeningStep", "planner: {screening: 2, screening_time_step: 0.007}\n", {"planner.screening_time_step", "0.007", "step_duration, 1 s"}},
+    {"TooMuchToScreen", "planner: {screening: 10000, rollouts: 1000}\n", {"planner.rollouts", "planner.screening", "1000000"}},
     {"UnknownKey", "step_duration: 1\nsteps: 3\n", {"p.yaml:2", "steps", "unknown key", "min_steps"}},
     {"UnknownPlannerKey", "planner:\n  rollout: 3\n", {"p.yaml:2", "planner.rollout", "unknown key", "rollouts"}},
     {"UnknownObjectiveKey", "objective: {gaol: 3}\n", {"p.yaml:1", "objective.gaol", "unknown key", "goal"}},

@@ -1,4 +1,4 @@
-#include "services/bench/statistics.hpp"
+#include "services/support/statistics.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -86,7 +86,7 @@ TEST_P(WorkerOfARun, IsNotMissedWhenItIsGone) {
       "thorough.yaml", "objective: {success_cost: 1.0e-9}\n"
                        "control: {many_iterations: 6, few_iterations: 0}\n");
   start({easy, "--workers", "2", "--parameters", thorough});
-  ASSERT_TRUE(run->says("planning  iteration  1", kPatience)) << run->err();
+  ASSERT_TRUE(searches()) << run->err();
   const pid_t victim = run->child("jostle_worker");
   ASSERT_GT(victim, 0);
 

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -51,7 +52,14 @@ class RunFixture : public ::testing::Test {
   void start_planning(std::vector<std::string> more = {}) {
     more.insert(more.begin(), {easy, "--workers", "2", "--parameters", endless});
     start(std::move(more));
-    ASSERT_TRUE(run->says("planning  iteration  1", kPatience)) << run->err();
+    ASSERT_TRUE(searches()) << run->err();
+  }
+
+  /// Waits until the run has an iteration behind it, whichever it shows first.
+  bool searches() const {
+    static const std::regex under_way("planning +iteration +[1-9]");
+    soon(kPatience, [&] { return std::regex_search(run->err(), under_way) || run->code(); });
+    return !run->code();
   }
 
   /// A run whose world takes its time, one action done. Six actions take

@@ -79,13 +79,16 @@ Result<TimedPlan> timed_plan(Pool& pool, const PbstoOptions& options, const plan
 }
 
 // Candidates per second of a planner that is never content. A candidate that is
-// screened and run again counts once.
+// screened and run again counts once. Losers run to their ends: how many stop early
+// depends on how good the straight line is, not on what a rollout costs.
 Result<double> speed(Pool& pool, const Task& task, PbstoOptions options, const CheapPhysicsOptions& study,
                      std::stop_token stop) {
   options.min_steps = physics_pool::kMaxSteps;
+  options.stop_losers = false;
+  options.objective.success_cost = 0.0;
   auto timed_result = timed_plan(pool, options, task.problem(study.control, study.iterations), stop);
   if (!timed_result) return timed_result.error();
-  const int candidates = study.iterations * options.rollouts * options.screening;
+  const int candidates = timed_result->plan.iterations * options.rollouts * options.screening;
   return candidates / timed_result->seconds;
 }
 
@@ -193,21 +196,25 @@ class Study {
       for (int seed = 1; seed <= std::max(options_.worlds, executed); ++seed) {
         auto task_result = generated(pool_, objects, static_cast<std::uint64_t>(seed));
         if (!task_result) return task_result.error();
-        if (seed <= options_.worlds) {
+        if (seed <= options_.worlds && wants("speed")) {
           if (auto ok = measure_speed(*task_result, objects); !ok) return ok.error();
+        }
+        if (seed <= options_.worlds && wants("truth")) {
           if (auto ok = measure_truth(*task_result, objects); !ok) return ok.error();
         }
-        if (seed > executed) continue;
+        if (seed > executed || !wants("success")) continue;
         if (auto ok = measure_success(*task_result, objects); !ok) return ok.error();
       }
     }
-    for (const Scene& scene : options_.demo) {
+    for (const Scene& scene : wants("demo") ? options_.demo : std::vector<Scene>{}) {
       if (auto ok = measure_demo(scene); !ok) return ok.error();
     }
     return CheapPhysics{.levers = results_.all(), .demo = std::move(demo_)};
   }
 
  private:
+  bool wants(const char* part) const { return std::ranges::find(options_.parts, part) != options_.parts.end(); }
+
   template <class... T>
   void tell(fmt::format_string<T...> format, T&&... values) const {
     if (options_.on_news) options_.on_news(fmt::format(format, std::forward<T>(values)...));
@@ -453,6 +460,7 @@ Result<void> bench_cheap_physics(CheapPhysicsOptions options, const CheapPhysics
   nlohmann::json json = to_json(*results);
   const auto save = [&] { return files.json.empty() ? Result<void>{} : write_text(files.json, json.dump(1) + "\n"); };
   if (auto ok = save(); !ok) return ok;  // before the peers: half of an hour is worth keeping
+  if (std::ranges::find(options.parts, "peers") == options.parts.end()) return {};
   auto curves_result = compare_peers(pool, shipped, options, stop);
   if (!curves_result) return curves_result.error();
   json["peers"] = to_json(*curves_result)["curves"];

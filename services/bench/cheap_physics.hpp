@@ -30,6 +30,8 @@ std::vector<Lever> usual_levers(const planners::PbstoOptions& shipped);
 
 struct CheapPhysicsOptions {
   std::vector<Lever> levers;
+  /// What to measure: any of speed, truth, success, demo, peers.
+  std::vector<std::string> parts{"speed", "truth", "success", "demo", "peers"};
   planners::ControlOptions control;    ///< initial_steps, many_iterations and step_duration
   std::vector<int> sizes{5, 10, 15, 40};  ///< objects beside the target
   int worlds = 3;                      ///< of each size, seeds 1 to this
@@ -49,7 +51,7 @@ struct CheapPhysicsOptions {
 struct LeverResult {
   std::string name;
   int objects = 0;
-  std::vector<double> ratios;      ///< candidates per second, one per world and repeat
+  std::vector<double> ratios;      ///< candidates per second, losers not stopped; one per world and repeat
   std::vector<double> correlations;  ///< per world: Spearman's, of what ranks candidates first with full physics
   std::vector<double> pose_errors;   ///< m, last position of each object that full physics moved by 1 mm
   int planned = 0, executed = 0, worlds = 0;  ///< success predicted; success in the full world

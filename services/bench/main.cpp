@@ -55,8 +55,10 @@ int perform(const Benchmark& benchmark, Settings settings, const std::string& js
   return agree ? kExitOk : kExitFailed;
 }
 
-int compare_levers(const Settings& settings, const std::string& json, const std::string& plot, int worlds) {
-  CheapPhysicsOptions options{.executed_worlds = worlds,
+int compare_levers(const Settings& settings, const std::string& json, const std::string& plot, int worlds,
+                   const std::vector<std::string>& parts) {
+  CheapPhysicsOptions options{.parts = parts,
+                              .executed_worlds = worlds,
                               .on_news = [](const std::string& line) { fmt::print(stderr, "{}\n", line); }};
   if (settings.repeats > 0) options.repeats = settings.repeats;
   const auto ok = bench_cheap_physics(options, {.json = json, .plot = plot}, data_file("experiments/grasping.yaml"),
@@ -83,6 +85,7 @@ int main(int argc, char** argv) {
   CLI::App app("Measures the ratio of two ways to do the same work, in turns, on this machine.", "jostle bench");
   std::string name, json, plot;
   int worlds = CheapPhysicsOptions{}.executed_worlds;
+  std::vector<std::string> parts = CheapPhysicsOptions{}.parts;
   // Of its own, so that neither a user's system nor another benchmark is in the way.
   Settings settings{.workers = {64}, .domain = 100 + static_cast<int>(getpid() % 100)};
   app.add_option("name", name, "A benchmark, or `list`")->required();
@@ -90,6 +93,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100'000));
   app.add_option("--json", json, "File for all numbers");
   app.add_option("--plot", plot, "Of cheap-physics: PNG of cost against rollouts and against time");
+  app.add_option("--parts", parts, "Of cheap-physics: what to measure")
+      ->capture_default_str()->delimiter(',')->check(CLI::IsMember(parts));
   app.add_option("--worlds", worlds, "Of cheap-physics: worlds of 15 objects that are planned and executed")
       ->capture_default_str()->check(CLI::Range(1, 1000));
   app.add_option("--workers", settings.workers, "Of scheduling: worker processes, such as 8,16,64")
@@ -102,9 +107,9 @@ int main(int argc, char** argv) {
   const StopSignal signal;
   settings.stop = signal.token();
   try {
-    if (name == kCheapPhysics) return compare_levers(settings, json, plot, worlds);
-    if (app.count("--plot") + app.count("--worlds") > 0) {
-      fmt::print(stderr, "jostle bench: --plot, --worlds: got '{}', wanted {}\n", name, kCheapPhysics);
+    if (name == kCheapPhysics) return compare_levers(settings, json, plot, worlds, parts);
+    if (app.count("--plot") + app.count("--worlds") + app.count("--parts") > 0) {
+      fmt::print(stderr, "jostle bench: --plot, --worlds, --parts: got '{}', wanted {}\n", name, kCheapPhysics);
       return kExitUsage;
     }
     return start(name, settings, json);

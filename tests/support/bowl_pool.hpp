@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "physics_pool/api/pool.hpp"
+#include "planners/api/planner.hpp"
 
 namespace jostle::tests {
 
@@ -98,5 +99,17 @@ class BowlPool final : public physics_pool::Pool {
 
   std::vector<double> wanted_;
 };
+
+/// Three steps that start from standing still, for a planner of the bowl.
+inline planners::Problem bowl_problem(int iterations) {
+  planners::Problem problem;
+  problem.world = hash_of("bowl");
+  problem.x0 = {.q = std::vector<double>(12, 0.0), .v = std::vector<double>(11, 0.0)};
+  problem.initial = {.nu = 4, .values = std::vector<double>(12, 0.0)};
+  problem.iterations = iterations;
+  problem.seed = 42;
+  problem.stream = 7;
+  return problem;
+}
 
 }  // namespace jostle::tests

@@ -21,16 +21,7 @@ constexpr TimePoint kNever = TimePoint::max();
 
 class SamplingTest : public testing::Test {
  protected:
-  static Problem problem(int iterations) {
-    Problem result;
-    result.world = hash_of("bowl");
-    result.x0 = {.q = std::vector<double>(12, 0.0), .v = std::vector<double>(11, 0.0)};
-    result.initial = {.nu = 4, .values = std::vector<double>(12, 0.0)};  // three steps
-    result.iterations = iterations;
-    result.seed = 42;
-    result.stream = 7;
-    return result;
-  }
+  static Problem problem(int iterations) { return tests::bowl_problem(iterations); }
 
   Plan planned(const Problem& p) {
     SamplingPlanner sut(pool, options, [this](const Progress& progress) { news.push_back(progress); });

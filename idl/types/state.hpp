@@ -28,8 +28,9 @@ struct ObjectSlot {
   bool operator==(const ObjectSlot&) const = default;
 };
 
-/// Names the parts of a State. The robot's joints come first, in the order
-/// x, y [m], rotation [rad], left and right finger [m]; then the objects.
+/// Names the parts of a State. The robot's joints come first; then the objects.
+/// A planar gripper has x, y [m], rotation [rad], left and right finger [m]; a
+/// pusher has x and y.
 struct StateLayout {
   int nq = 0;
   int nv = 0;
@@ -38,19 +39,22 @@ struct StateLayout {
   std::vector<ObjectSlot> objects;
   int target = -1;  ///< index into objects
 
+  int robot_joints() const { return static_cast<int>(joints.size()); }
+
   bool operator==(const StateLayout&) const = default;
 };
 
-/// Joint positions of the planar gripper inside State::q.
-enum RobotJoint : int { kJointX, kJointY, kJointRotation, kJointLeft, kJointRight, kRobotJoints };
+/// Joint positions inside State::q of the planar gripper; a pusher has the first two.
+enum RobotJoint : int { kJointX, kJointY, kJointRotation, kJointLeft, kJointRight, kGripperJoints, kPusherJoints = 2 };
 
 /// Entries of one control u: velocities of x, y [m/s], rotation [rad/s] and
-/// opening [m/s; the distance between the fingers grows]. Thesis, Sec. 3.1.
-enum ControlAxis : int { kControlX, kControlY, kControlRotation, kControlOpening, kControlAxes };
+/// opening [m/s; the distance between the fingers grows]. Thesis, Sec. 3.1. A
+/// pusher has the first two (Sec. 6.1).
+enum ControlAxis : int { kControlX, kControlY, kControlRotation, kControlOpening, kGripperAxes, kPusherAxes = 2 };
 
 /// U = u_0 … u_{n-1}, each held for the step duration of its user.
 struct ControlSequence {
-  int nu = kControlAxes;
+  int nu = kGripperAxes;
   std::vector<double> values;  ///< [n][nu] row-major, m/s and rad/s
 
   int steps() const { return nu > 0 ? static_cast<int>(values.size()) / nu : 0; }

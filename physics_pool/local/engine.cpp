@@ -51,6 +51,7 @@ void install_engine_handlers() {
 void set_controls(mjData& data, std::span<const double> u) {
   data.ctrl[0] = u[kControlX];
   data.ctrl[1] = u[kControlY];
+  if (u.size() == kPusherAxes) return;
   data.ctrl[2] = u[kControlRotation];
   data.ctrl[3] = data.ctrl[4] = u[kControlOpening] / 2;
 }

@@ -35,8 +35,8 @@ struct DataDeleter {
 using ModelPtr = std::unique_ptr<mjModel, ModelDeleter>;
 using DataPtr = std::unique_ptr<mjData, DataDeleter>;
 
-/// Sets the drives to u [kControlAxes], m/s and rad/s; each finger takes half of
-/// the opening.
+/// Sets the drives to u [nu], m/s and rad/s; of a gripper's opening each finger takes
+/// half.
 void set_controls(mjData& data, std::span<const double> u);
 
 /// Leaves nothing of what ran before: warm start, warnings, time.

@@ -13,7 +13,7 @@ constexpr std::uint32_t kVelocityNoiseStream = 0xe3e3;
 
 ExecutionWorld::ExecutionWorld(WorldPtr world, double velocity_sigma, std::uint64_t seed)
     : simulator_(world), sigma_(velocity_sigma), seed_(seed), state_(initial_state(world->scene())) {
-  begin(std::vector<double>(kControlAxes, 0.0));
+  begin(std::vector<double>(static_cast<std::size_t>(world->geometry().layout.nu), 0.0));
 }
 
 void ExecutionWorld::begin(std::span<const double> u) { simulator_.begin(state_, u); }

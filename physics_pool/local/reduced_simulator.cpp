@@ -92,14 +92,15 @@ struct ReducedSimulator::Part {
   }
 
   void inject(const StateLayout& layout, const State& x) {
-    std::copy_n(x.q.begin(), kRobotJoints, data->qpos);
-    std::copy_n(x.v.begin(), kRobotJoints, data->qvel);
+    const int joints = layout.robot_joints();
+    std::copy_n(x.q.begin(), joints, data->qpos);
+    std::copy_n(x.v.begin(), joints, data->qvel);
     for (int slot = 0; slot < objects; ++slot) {
       const ObjectSlot& at = slot_of(layout, slot);
       const auto q = x.q.begin() + at.q;
       if (slot < free) {
-        std::copy_n(q, 7, data->qpos + kRobotJoints + 7 * slot);
-        std::copy_n(x.v.begin() + at.v, 6, data->qvel + kRobotJoints + 6 * slot);
+        std::copy_n(q, 7, data->qpos + joints + 7 * slot);
+        std::copy_n(x.v.begin() + at.v, 6, data->qvel + joints + 6 * slot);
       } else {
         std::copy_n(q, 3, data->mocap_pos + 3 * (slot - free));
         std::copy_n(q + 3, 4, data->mocap_quat + 4 * (slot - free));
@@ -109,12 +110,13 @@ struct ReducedSimulator::Part {
   }
 
   void read(const StateLayout& layout, State& x) const {
-    std::copy_n(data->qpos, kRobotJoints, x.q.begin());
-    std::copy_n(data->qvel, kRobotJoints, x.v.begin());
+    const int joints = layout.robot_joints();
+    std::copy_n(data->qpos, joints, x.q.begin());
+    std::copy_n(data->qvel, joints, x.v.begin());
     for (int slot = 0; slot < free; ++slot) {
       const ObjectSlot& at = slot_of(layout, slot);
-      std::copy_n(data->qpos + kRobotJoints + 7 * slot, 7, x.q.begin() + at.q);
-      std::copy_n(data->qvel + kRobotJoints + 6 * slot, 6, x.v.begin() + at.v);
+      std::copy_n(data->qpos + joints + 7 * slot, 7, x.q.begin() + at.q);
+      std::copy_n(data->qvel + joints + 6 * slot, 6, x.v.begin() + at.v);
     }
   }
 

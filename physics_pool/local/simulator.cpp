@@ -71,7 +71,7 @@ State separate(const World& world, const State& x, double depth, int rounds) {
     std::fill_n(data->qvel, model->nv, 0.0);
     mj_step(model, data.get());
     // The robot's place is measured better than any object's: it yields nothing.
-    std::copy_n(x.q.begin(), kRobotJoints, data->qpos);
+    std::copy_n(x.q.begin(), world.geometry().layout.robot_joints(), data->qpos);
   }
   result.q.assign(data->qpos, data->qpos + model->nq);
   return result;

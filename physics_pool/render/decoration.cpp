@@ -60,6 +60,7 @@ void add_wrist(const mjModel& model, const mjData& data, mjvScene& scene) {
 }  // namespace
 
 void decorate(const mjModel& model, const mjData& data, mjvScene& scene) {
+  if (mj_name2id(&model, mjOBJ_BODY, "gripper") < 0) return;
   add_pad(model, data, "finger_left", scene);
   add_pad(model, data, "finger_right", scene);
   add_wrist(model, data, scene);

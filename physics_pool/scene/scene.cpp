@@ -1,6 +1,7 @@
 #include "physics_pool/scene/scene.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -30,8 +31,11 @@ Footprint footprint(const SceneObject& object) {
   return result;
 }
 
+Footprint footprint(const Disc& disc) { return {.x = disc.x, .y = disc.y, .radius = disc.radius}; }
+
 std::vector<Footprint> footprint(const SceneRobot& robot) {
   namespace hand = planar_gripper;
+  if (robot.is_pusher()) return {{.x = robot.x, .y = robot.y, .radius = robot.radius}};
   const double c = std::cos(robot.rotation), s = std::sin(robot.rotation);
   const auto part = [&](double x_min, double x_max, double y, double width) {
     const double x = (x_min + x_max) / 2;
@@ -109,6 +113,26 @@ Result<void> check(const Locate& locate, const Field& parent, std::initializer_l
 
 constexpr double kSmallest = 0.002, kLargest = 2.0;  // m, any size of an object
 
+// One of a field's words, or the complaint.
+Result<void> check_word(const Locate& locate, const char* field, const std::string& got,
+                        std::initializer_list<const char*> words) {
+  if (std::ranges::find(words, got) != words.end()) return {};
+  return invalid(locate, {field, field}, fmt::format("got '{}', wanted one of: {}", got, fmt::join(words, ", ")));
+}
+
+// What only pushing has.
+Result<void> check_push(const Scene& scene, const Locate& locate) {
+  const double half_x = scene.surface.size[0] / 2, half_y = scene.surface.size[1] / 2;
+  const auto check_disc = [&](const std::string& field, const Disc& disc) {
+    return check(locate, {field, field}, {{".x", disc.x, -half_x, half_x, "m, on the surface"},
+                                          {".y", disc.y, -half_y, half_y, "m, on the surface"},
+                                          {".radius", disc.radius, kSmallest, kLargest, "m"}});
+  };
+  if (auto ok = check_disc("task.goal", scene.task.goal); !ok) return ok;
+  if (!scene.task.obstacle) return {};
+  return check_disc("task.obstacle", *scene.task.obstacle);
+}
+
 }  // namespace
 
 double SceneObject::rest_height() const {
@@ -118,6 +142,10 @@ double SceneObject::rest_height() const {
 int Scene::target() const {
   const auto found = std::ranges::find(objects, task.target, &SceneObject::name);
   return found == objects.end() ? -1 : static_cast<int>(found - objects.begin());
+}
+
+double signed_distance(const SceneObject& object, const Disc& disc) {
+  return disc_gap(footprint(disc), footprint(object));
 }
 
 bool overlap(const SceneObject& a, const SceneObject& b, double gap) {
@@ -136,23 +164,26 @@ Result<void> validate(const Scene& scene, const std::string& origin) {
 }
 
 Result<void> validate(const Scene& scene, const Locate& locate) {
-  if (scene.robot.model != "planar_gripper") {
-    return invalid(locate, {"robot.model", "robot.model"},
-                   fmt::format("got '{}', wanted one of: planar_gripper", scene.robot.model));
-  }
-  if (scene.task.kind != "grasp") {
+  const SceneRobot& robot = scene.robot;
+  if (auto ok = check_word(locate, "robot.model", robot.model, {"planar_gripper", "pusher"}); !ok) return ok;
+  if (auto ok = check_word(locate, "task.kind", scene.task.kind, {"grasp", "push"}); !ok) return ok;
+  if (robot.is_pusher() != scene.task.is_push()) {
     return invalid(locate, {"task.kind", "task.kind"},
-                   fmt::format("got '{}', wanted one of: grasp", scene.task.kind));
+                   fmt::format("got '{}' for a {}, wanted grasp with a planar_gripper or push with a pusher",
+                               scene.task.kind, robot.model));
   }
+  if (auto ok = check_word(locate, "physics.integrator", scene.physics.integrator, {"euler", "rk4"}); !ok) return ok;
   const double half_x = scene.surface.size[0] / 2, half_y = scene.surface.size[1] / 2;
   if (auto ok = check(locate, {},
                       {{"surface.size[0]", scene.surface.size[0], 0.1, 10, "m"},
                        {"surface.size[1]", scene.surface.size[1], 0.1, 10, "m"},
                        {"surface.wall_height", scene.surface.wall_height, 0.01, 2, "m"},
-                       {"robot.start.x", scene.robot.x, -10, 10, "m"},
-                       {"robot.start.y", scene.robot.y, -10, 10, "m"},
-                       {"robot.start.rotation", scene.robot.rotation, -7, 7, "rad"},
-                       {"robot.start.opening", scene.robot.opening, 0, planar_gripper::kStroke, "m"},
+                       {"robot.start.x", robot.x, -10, 10, "m"},
+                       {"robot.start.y", robot.y, -10, 10, "m"},
+                       {"robot.start.rotation", robot.rotation, -7, 7, "rad"},
+                       {"robot.start.opening", robot.opening, 0, planar_gripper::kStroke, "m"},
+                       {"robot.radius", robot.radius, kSmallest, kLargest, "m"},
+                       {"robot.height", robot.height, kSmallest, kLargest, "m"},
                        {"physics.time_step", scene.physics.time_step, 1e-4, 0.02, "s"},
                        {"physics.iterations", double(scene.physics.iterations), 1, 1000, ""},
                        {"physics.tolerance", scene.physics.tolerance, 0, 1, ""}});
@@ -201,14 +232,19 @@ Result<void> validate(const Scene& scene, const Locate& locate) {
     return invalid(locate, {"task.target", "task.target"},
                    fmt::format("got '{}', wanted the name of an object", scene.task.target));
   }
-  return {};
+  return scene.task.is_push() ? check_push(scene, locate) : Result<void>{};
 }
 
 StateLayout layout_of(const Scene& scene) {
   StateLayout layout;
-  layout.joints = {"gripper_x", "gripper_y", "gripper_rotation", "finger_left", "finger_right"};
-  layout.nq = layout.nv = kRobotJoints;
-  layout.nu = kControlAxes;
+  if (scene.robot.is_pusher()) {
+    layout.joints = {"pusher_x", "pusher_y"};
+    layout.nu = kPusherAxes;
+  } else {
+    layout.joints = {"gripper_x", "gripper_y", "gripper_rotation", "finger_left", "finger_right"};
+    layout.nu = kGripperAxes;
+  }
+  layout.nq = layout.nv = layout.robot_joints();
   for (const SceneObject& object : scene.objects) {
     layout.objects.push_back({.name = object.name, .q = layout.nq, .v = layout.nv});
     layout.nq += 7;
@@ -221,7 +257,8 @@ StateLayout layout_of(const Scene& scene) {
 State initial_state(const Scene& scene) {
   const SceneRobot& robot = scene.robot;
   State state;
-  state.q = {robot.x, robot.y, robot.rotation, robot.opening / 2, robot.opening / 2};
+  state.q = {robot.x, robot.y};
+  if (!robot.is_pusher()) state.q.insert(state.q.end(), {robot.rotation, robot.opening / 2, robot.opening / 2});
   for (const SceneObject& object : scene.objects) {
     state.q.insert(state.q.end(), {object.x, object.y, object.rest_height(),
                                    std::cos(object.yaw / 2), 0, 0, std::sin(object.yaw / 2)});

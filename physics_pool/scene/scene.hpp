@@ -43,23 +43,46 @@ struct Surface {
   double wall_height = 0.15;             ///< m, shelf only
 };
 
-/// A planar gripper that moves at a fixed height above the surface. Its origin
-/// G is the point of Fig. 3.2: the middle of the palm's face, x forward.
+/// What moves at a fixed height above the surface, driven by velocities:
+///
+///   planar_gripper  its origin G is the point of Fig. 3.2: the middle of the
+///                   palm's face, x forward
+///   pusher          an upright cylinder (Sec. 6.1) that has no rotation
 struct SceneRobot {
   std::string model = "planar_gripper";
-  double x = -0.3, y = 0.0;  ///< start of G, m
-  double rotation = 0.0;     ///< rad about z; 0 looks along +x
-  double opening = 0.085;    ///< m between the fingers
+  double x = -0.3, y = 0.0;  ///< start of G, or of the pusher's axis, m
+  double rotation = 0.0;     ///< rad about z; 0 looks along +x; gripper only
+  double opening = 0.085;    ///< m between the fingers; gripper only
+  double radius = 0.0145;    ///< m, pusher only
+  double height = 0.11;      ///< m, pusher only
+
+  bool is_pusher() const { return model == "pusher"; }
 };
 
+/// A disc on the surface.
+struct Disc {
+  double x = 0.0, y = 0.0, radius = 0.0;  // m
+};
+
+/// What is to be done with the target:
+///
+///   grasp  bring it into the hand (Ch. 3)
+///   push   bring its centre into the goal region (Sec. 6.2, 7.1), neither it nor
+///          the pusher over the obstacle, nothing else into the region
 struct SceneTask {
   std::string kind = "grasp";
   std::string target;  ///< name of an object
+  Disc goal{.radius = 0.04};     ///< push only
+  std::optional<Disc> obstacle;  ///< push only; a keep-out area, not a body
+
+  bool is_push() const { return kind == "push"; }
 };
 
 /// Engine options; part of the world's identity.
 struct ScenePhysics {
   double time_step = 0.002;  ///< s
+  /// "euler" (semi-implicit), or "rk4", four times the work per step, as in Ch. 6.
+  std::string integrator = "euler";
   int iterations = 50;       ///< Newton iterations at most
   double tolerance = 1e-8;
 };
@@ -96,6 +119,10 @@ Result<void> validate(const Scene& scene, const std::string& origin);
 /// or file and line.
 using Locate = std::function<std::string(std::string_view field)>;
 Result<void> validate(const Scene& scene, const Locate& locate);
+
+/// Signed distance between the footprints of an object and a disc, m; negative
+/// inside. Of boxes that overlap, how far they would have to part.
+double signed_distance(const SceneObject& object, const Disc& disc);
 
 /// Whether the footprints of two objects come closer than `gap` metres.
 bool overlap(const SceneObject& a, const SceneObject& b, double gap = 0.0);

@@ -14,6 +14,12 @@ namespace {
 using yaml::Fields;
 using yaml::Malformed;
 
+void read_disc(Fields& fields, Disc& disc) {
+  fields.required("x", disc.x);
+  fields.required("y", disc.y);
+  fields.required("radius", disc.radius);
+}
+
 Scene read(const YAML::Node& root, const std::string& origin) {
   Scene scene;
   Fields fields(root, "", origin);
@@ -38,6 +44,8 @@ Scene read(const YAML::Node& root, const std::string& origin) {
       start.optional("rotation", scene.robot.rotation);
       start.optional("opening", scene.robot.opening);
     });
+    robot.optional("radius", scene.robot.radius);
+    robot.optional("height", scene.robot.height);
   });
   fields.list("objects", [&](Fields& entry) {
     SceneObject object;
@@ -61,9 +69,12 @@ Scene read(const YAML::Node& root, const std::string& origin) {
   fields.section("task", true, [&](Fields& task) {
     task.optional("kind", scene.task.kind);
     task.required("target", scene.task.target);
+    task.section("goal", scene.task.is_push(), [&](Fields& goal) { read_disc(goal, scene.task.goal); });
+    task.section("obstacle", false, [&](Fields& obstacle) { read_disc(obstacle, scene.task.obstacle.emplace()); });
   });
   fields.section("physics", false, [&](Fields& physics) {
     physics.optional("time_step", scene.physics.time_step);
+    physics.optional("integrator", scene.physics.integrator);
     physics.optional("iterations", scene.physics.iterations);
     physics.optional("tolerance", scene.physics.tolerance);
   });
@@ -116,8 +127,14 @@ std::string to_yaml(const Scene& scene) {
   line("  wall_height: {}", scene.surface.wall_height);
   line("robot:");
   line("  model: {}", quoted(scene.robot.model));
-  line("  start: {{x: {}, y: {}, rotation: {}, opening: {}}}", scene.robot.x, scene.robot.y,
-       scene.robot.rotation, scene.robot.opening);
+  if (scene.robot.is_pusher()) {
+    line("  start: {{x: {}, y: {}}}", scene.robot.x, scene.robot.y);
+    line("  radius: {}", scene.robot.radius);
+    line("  height: {}", scene.robot.height);
+  } else {
+    line("  start: {{x: {}, y: {}, rotation: {}, opening: {}}}", scene.robot.x, scene.robot.y,
+         scene.robot.rotation, scene.robot.opening);
+  }
   line("objects:");
   for (const SceneObject& object : scene.objects) {
     line("  - name: {}", quoted(object.name));
@@ -133,9 +150,16 @@ std::string to_yaml(const Scene& scene) {
     line("    friction: {}", object.friction);
     line("    pose: {{x: {}, y: {}, yaw: {}}}", object.x, object.y, object.yaw);
   }
-  line("task: {{kind: {}, target: {}}}", scene.task.kind, quoted(scene.task.target));
-  line("physics: {{time_step: {}, iterations: {}, tolerance: {}}}", scene.physics.time_step,
-       scene.physics.iterations, scene.physics.tolerance);
+  line("task:");
+  line("  kind: {}", scene.task.kind);
+  line("  target: {}", quoted(scene.task.target));
+  const auto disc = [&](const char* key, const Disc& area) {
+    line("  {}: {{x: {}, y: {}, radius: {}}}", key, area.x, area.y, area.radius);
+  };
+  if (scene.task.is_push()) disc("goal", scene.task.goal);
+  if (scene.task.obstacle) disc("obstacle", *scene.task.obstacle);
+  line("physics: {{time_step: {}, integrator: {}, iterations: {}, tolerance: {}}}", scene.physics.time_step,
+       scene.physics.integrator, scene.physics.iterations, scene.physics.tolerance);
   return text;
 }
 

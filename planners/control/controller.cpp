@@ -200,7 +200,7 @@ class Run {
   // Opens or closes by `way` metres, or until the fingers meet something.
   Result<void> move_fingers(double way) {
     notify(Phase::kClosing);
-    std::vector<double> u(kControlAxes, 0.0);
+    std::vector<double> u(kGripperAxes, 0.0);
     u[kControlOpening] = way / options_.step_duration;
     if (auto ok = setup_.robot.execute(u, options_.step_duration, stop_); !ok) return ok;
     return observe();
@@ -222,7 +222,7 @@ class Run {
     const double speed = hand::kFingerLength / (back * options_.step_duration);
     State away = x_;
     ControlSequence controls;
-    std::vector<double> u(kControlAxes, 0.0);
+    std::vector<double> u(kGripperAxes, 0.0);
     u[kControlX] = -speed * std::cos(x_.q[kJointRotation]);
     u[kControlY] = -speed * std::sin(x_.q[kJointRotation]);
     for (int t = 0; t < back; ++t) controls.append(u);
@@ -239,7 +239,7 @@ class Run {
     const Step way = to_pregrasp(setup_.geometry, x);
     const double distance = std::hypot(way.dx, way.dy);
     const double speed = std::min(options_.straight_speed, distance / options_.step_duration);
-    std::vector<double> u(kControlAxes, 0.0);
+    std::vector<double> u(kGripperAxes, 0.0);
     if (distance > 0) {
       u[kControlX] = speed * way.dx / distance;
       u[kControlY] = speed * way.dy / distance;

@@ -4,14 +4,12 @@
 
 #include <cmath>
 
-#include "idl/types/state.hpp"
-
 namespace jostle::robot_bridge {
 
-Result<void> check_command(std::span<const double> u, double duration) {
-  if (u.size() != kControlAxes) {
+Result<void> check_command(std::span<const double> u, int axes, double duration) {
+  if (u.size() != static_cast<std::size_t>(axes)) {
     return Error{Code::kInvalidArgument,
-                 fmt::format("velocities: got {} values, wanted {}", u.size(), int{kControlAxes})};
+                 fmt::format("velocities: got {} values, wanted {}", u.size(), axes)};
   }
   for (std::size_t i = 0; i < u.size(); ++i) {
     if (std::abs(u[i]) <= kFastest) continue;  // false for NaN

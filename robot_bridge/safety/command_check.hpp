@@ -12,9 +12,9 @@ namespace jostle::robot_bridge {
 inline constexpr double kFastest = 2.0;         // m/s, rad/s
 inline constexpr double kLongestAction = 60.0;  // s
 
-/// Checks a control (x, y [m/s], rotation [rad/s], opening [m/s]) held for
-/// `duration` seconds.
+/// Checks a control of `axes` velocities, m/s and rad/s in the order of ControlAxis,
+/// held for `duration` seconds.
 /// Error kInvalidArgument naming the field, what it got and what it wanted.
-Result<void> check_command(std::span<const double> u, double duration);
+Result<void> check_command(std::span<const double> u, int axes, double duration);
 
 }  // namespace jostle::robot_bridge

@@ -106,7 +106,7 @@ Result<std::vector<RolloutOutcome>> samples(Pool& pool, const Task& task, const 
   RolloutBatch batch{.world = task.hash,
                      .x0 = problem.x0,
                      .nominal = problem.initial,
-                     .u_before = std::vector<double>(kControlAxes, 0.0),
+                     .u_before = std::vector<double>(kGripperAxes, 0.0),
                      .step_duration = options.step_duration,
                      .law = {.sigma = options.sigma, .limit = options.limit, .scales = options.scales, .seed = task.seed},
                      .samples = study.samples,

@@ -12,8 +12,8 @@ using planners::ControlOptions;
 using planners::PbstoOptions;
 
 void read_axes(yaml::Fields& fields, const char* key, std::vector<double>& values) {
-  std::array<double, kControlAxes> axes{};
-  std::copy_n(values.begin(), kControlAxes, axes.begin());
+  std::array<double, kGripperAxes> axes{};
+  std::copy_n(values.begin(), kGripperAxes, axes.begin());
   fields.numbers(key, axes, false);
   values.assign(axes.begin(), axes.end());
 }

@@ -40,7 +40,7 @@ GraspingStudy read(const YAML::Node& root, const std::string& origin, std::strin
 
 double execution_cost(const physics_pool::TaskGeometry& geometry,
                       const physics_pool::Objective& objective, const Trajectory& states) {
-  const std::vector<double> still(kControlAxes, 0.0);
+  const std::vector<double> still(kGripperAxes, 0.0);
   double sum = physics_pool::final_cost(geometry, objective, states.back());
   for (std::size_t t = 0; t + 1 < states.size(); ++t) {
     sum += physics_pool::running_cost(geometry, objective, still, still, states[t], states[t + 1]);

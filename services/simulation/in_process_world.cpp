@@ -24,14 +24,15 @@ std::vector<perception::ObjectReading> object_readings(const StateLayout& layout
 
 Result<robot_bridge::RobotReading> SimulatedRobot::read() {
   const State& x = world_.state();
+  const int joints = world_.world().geometry().layout.robot_joints();
   return robot_bridge::RobotReading{
-      .q = {x.q.begin(), x.q.begin() + kRobotJoints},
-      .v = {x.v.begin(), x.v.begin() + kRobotJoints},
+      .q = {x.q.begin(), x.q.begin() + joints},
+      .v = {x.v.begin(), x.v.begin() + joints},
       .object_in_hand = physics_pool::grasped(world_.world().geometry(), x, {})};
 }
 
 Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {
-  if (auto ok = robot_bridge::check_command(u, duration); !ok) return ok;
+  if (auto ok = robot_bridge::check_command(u, world_.world().geometry().layout.nu, duration); !ok) return ok;
   world_.begin(u);
   const long steps = std::lround(duration / world_.world().time_step());
   for (long i = 0; i < steps; ++i) {

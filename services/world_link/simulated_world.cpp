@@ -24,6 +24,7 @@ SimulatedWorld::SimulatedWorld(const dds::Participant& participant, physics_pool
     : options_(options),
       world_(world, physics_pool::velocity_noise(options.level), options.seed),
       belief_(physics_pool::perturb(world->scene(), options.level, options.seed)),
+      still_(static_cast<std::size_t>(world->geometry().layout.nu), 0.0),
       joints_(participant, topics::kJointStates),
       objects_(participant, topics::kObjectStates),
       poses_(participant, topics::kObjectPoses),
@@ -60,7 +61,8 @@ void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
                  command.sequence_number(), ++dropped_);
     return;
   }
-  const auto check_result = robot_bridge::check_command(command.velocities(), command.duration());
+  const auto check_result = robot_bridge::check_command(command.velocities(), world_.world().geometry().layout.nu,
+                                                        command.duration());
   if (!check_result && command.epoch() > epoch_) {  // the present commander must not suffer for it
     spdlog::warn("command {}/{} of a newcomer: {}; refused", command.epoch(), command.sequence_number(),
                  check_result.error().message);
@@ -111,9 +113,8 @@ Result<void> SimulatedWorld::rest(std::stop_token stop) {
     if (auto command = commands_.take(next_publication_, stop)) accept(*command);
     return {};
   }
-  static const std::vector<double> kStill(kControlAxes, 0.0);
   const double time_step = world_.world().time_step();
-  world_.begin(kStill);
+  world_.begin(still_);
   if (auto ok = world_.step(); !ok) return ok;
   const double rate = options_.rate > 0 ? options_.rate : 1.0;
   std::this_thread::sleep_for(std::chrono::duration<double>(time_step / rate));

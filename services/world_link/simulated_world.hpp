@@ -59,6 +59,7 @@ class SimulatedWorld {
   SimulatedWorldOptions options_;
   physics_pool::ExecutionWorld world_;
   physics_pool::Scene belief_;
+  std::vector<double> still_;          // the control that moves nothing
   std::deque<Action> actions_;
   std::uint64_t epoch_ = 0;            // of the commander
   std::uint64_t finished_ = 0;         // its last finished command

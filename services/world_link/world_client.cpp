@@ -79,7 +79,7 @@ Result<robot_bridge::RobotReading> RobotClient::read() {
 }
 
 Result<void> RobotClient::execute(std::span<const double> u, double duration, std::stop_token stop) {
-  if (auto ok = robot_bridge::check_command(u, duration); !ok) return ok;
+  if (auto ok = robot_bridge::check_command(u, static_cast<int>(u.size()), duration); !ok) return ok;
   if (!command_.wait_for_readers(steady_clock::now() + options_.start)) {
     return silent("robot", topics::kRobotCommand.name, options_.start, false);
   }

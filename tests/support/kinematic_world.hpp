@@ -30,8 +30,8 @@ class KinematicRobot final : public robot_bridge::Robot {
 
   Result<robot_bridge::RobotReading> read() override {
     if (read_error) return *read_error;
-    return robot_bridge::RobotReading{.q = {x_.q.begin(), x_.q.begin() + kRobotJoints},
-                                      .v = std::vector<double>(kRobotJoints, 0.0),
+    return robot_bridge::RobotReading{.q = {x_.q.begin(), x_.q.begin() + kGripperJoints},
+                                      .v = std::vector<double>(kGripperJoints, 0.0),
                                       .object_in_hand = object_in_hand};
   }
 

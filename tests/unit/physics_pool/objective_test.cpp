@@ -297,7 +297,7 @@ TEST_F(ObjectiveTerms, AreNeverNegativeOrInfiniteForRandomStates) {
   for (int i = 0; i < 5000; ++i) {
     State a = start, b = start;
     for (State* x : {&a, &b}) {
-      for (int j = 0; j < kRobotJoints; ++j) x->q[std::size_t(j)] = random.normal(0, 2);
+      for (int j = 0; j < kGripperJoints; ++j) x->q[std::size_t(j)] = random.normal(0, 2);
       for (int k = 0; k < 3; ++k) {
         double norm = 0.0;
         for (int j = 0; j < 3; ++j) object(*x, k)[j] = random.normal(0, 0.5);

@@ -59,14 +59,14 @@ TEST(ReducedSimulator, FreeObjectMovesAsIfTheFrozenOnesWereNotThere) {
     ReducedSimulator sut(compile(scene), kFrozen);
     State a = initial_state(alone), b = initial_state(scene);
     const StateLayout layout = layout_of(scene);
-    a.v[kRobotJoints + 5] = b.v[static_cast<std::size_t>(layout.objects[moving].v) + 5] = 1.0;  // it spins, rad/s
+    a.v[kGripperJoints + 5] = b.v[static_cast<std::size_t>(layout.objects[moving].v) + 5] = 1.0;  // it spins, rad/s
     const std::array u{0.0, 0.0, 0.0, 0.0};
 
     (void)fine.advance(a, u, kSecond / 10);
     const Advance advance = sut.advance(b, u, kSecond / 10);
 
     ASSERT_EQ(advance.thawed, 0u);
-    EXPECT_EQ(hash_of(std::vector<double>(a.q.begin() + kRobotJoints, a.q.end())),
+    EXPECT_EQ(hash_of(std::vector<double>(a.q.begin() + kGripperJoints, a.q.end())),
               hash_of(std::vector<double>(pose(layout, b, moving).begin(), pose(layout, b, moving).end())));
   }
 }
@@ -264,7 +264,7 @@ TEST_F(RandomPushes, FindEveryTouchAndAgreeWithTheFullModelWhereNothingIsTouched
       ASSERT_EQ(sut.advance(b, u, kSecond).thawed, 0u);
       ++untouched;
       const StateLayout& layout = world->geometry().layout;
-      for (int joint = 0; joint < kRobotJoints; ++joint) EXPECT_NEAR(a.q[joint], b.q[joint], 1e-9);
+      for (int joint = 0; joint < kGripperJoints; ++joint) EXPECT_NEAR(a.q[joint], b.q[joint], 1e-9);
       for (std::size_t i = 0; i < layout.objects.size(); ++i) {
         EXPECT_LT(distance(pose(layout, a, i), pose(layout, b, i)), 0.001);
       }

@@ -303,7 +303,7 @@ TEST(World, StartsInTheStateOfItsScene) {
   const Scene scene = tests::three_objects();
   const WorldPtr world = compiled(scene);
   const State x = initial_state(scene);
-  for (std::size_t i = kRobotJoints; i < x.q.size(); ++i) {
+  for (std::size_t i = kGripperJoints; i < x.q.size(); ++i) {
     EXPECT_NEAR(world->model()->qpos0[i], x.q[i], 1e-12);
   }
 }
@@ -348,7 +348,7 @@ TEST(Separate, LeavesTheRobotInPlaceWhenAnObjectIsInsideIt) {
   State x = initial_state(scene);
   object(*world, x, 0).p[0] = scene.robot.x + 0.015;  // 5 mm inside the palm
   State y = separate(*world, x);
-  for (std::size_t i = 0; i < kRobotJoints; ++i) EXPECT_EQ(y.q[i], x.q[i]);
+  for (std::size_t i = 0; i < kGripperJoints; ++i) EXPECT_EQ(y.q[i], x.q[i]);
   EXPECT_GT(object(*world, y, 0).p[0], scene.robot.x + 0.02 - 0.0006);
 }
 

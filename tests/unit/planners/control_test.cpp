@@ -503,7 +503,7 @@ TEST_F(AssembleState, PutsReadingsInTheOrderOfTheLayout) {
   for (std::size_t i = 0; i < x.v.size(); ++i) x.v[i] = double(i);
   auto reading = robot.read();
   ASSERT_TRUE(reading);
-  reading->v.assign(x.v.begin(), x.v.begin() + kRobotJoints);
+  reading->v.assign(x.v.begin(), x.v.begin() + kGripperJoints);
   const auto state = assemble_state(geometry.layout, *reading, *objects.read());
   ASSERT_TRUE(state) << state.error().message;
   EXPECT_EQ(*state, x);

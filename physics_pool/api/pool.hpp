@@ -4,6 +4,8 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -60,6 +62,29 @@ class Pool {
                                  std::stop_token stop = {}) = 0;
 
   virtual PoolStatus status() const = 0;
+};
+
+/// A pool whose batches may be left running: many at once, each as soon as it is
+/// known. That is what slices of a trajectory need.
+class AsyncPool : public Pool {
+ public:
+  /// A batch under way. Destroying it before its reply cancels it: then on_reply is
+  /// never called. Not to be destroyed from within on_reply, nor after the pool.
+  class Ticket {
+   public:
+    virtual ~Ticket() = default;
+    virtual std::uint32_t missing() const = 0;  ///< samples that have not come back
+  };
+
+  /// Called once, from a thread of the pool's. Must be quick and use nothing of the pool's.
+  using OnReply = std::function<void(Result<BatchReply>)>;
+
+  /// Starts a batch and returns. The replies are those of `run`.
+  /// Errors   those of `run` that can be told at once
+  virtual Result<std::unique_ptr<Ticket>> submit(const RolloutBatch& batch, OnReply on_reply) = 0;
+
+  /// Submits and waits.
+  Result<BatchReply> run(const RolloutBatch& batch, TimePoint deadline, std::stop_token stop = {}) final;
 };
 
 }  // namespace jostle::physics_pool

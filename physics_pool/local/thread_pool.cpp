@@ -21,16 +21,59 @@ Result<Hash> ThreadPool::load(const Scene& scene) {
   return hash;
 }
 
-Result<BatchReply> ThreadPool::run(const RolloutBatch& batch, TimePoint deadline,
-                                   std::stop_token stop) {
-  // Shared with the samples, which may outlive this call by a moment.
+// A batch whose samples are queued, running or done.
+class ThreadPool::Running final : public Ticket {
+ public:
+  Running(const BatchRunPtr& run, OnReply on_reply) : progress_(std::make_shared<Progress>()), run_(run) {
+    progress_->reply.outcomes.resize(run->batch.samples);
+    progress_->missing = run->batch.samples;
+    progress_->incumbent = run->batch.incumbent;
+    progress_->on_reply = std::move(on_reply);
+  }
+
+  // Running samples notice within one engine step; waiting for them keeps the
+  // promise that nothing of this batch runs any more.
+  ~Running() override {
+    run_->signals.cancel();
+    std::unique_lock lock(progress_->mutex);
+    if (!progress_->replied) progress_->on_reply = {};
+    progress_->done.wait(lock, [&] { return progress_->replied; });
+  }
+
+  std::uint32_t missing() const override {
+    const std::lock_guard lock(progress_->mutex);
+    return progress_->missing;
+  }
+
+  // What the threads call; it outlives this ticket by a moment.
+  auto receiver() const {
+    return [progress = progress_, first = run_->batch.first_sample](RolloutOutcome outcome) {
+      std::unique_lock lock(progress->mutex);
+      progress->reply.outcomes[outcome.sample - first] = std::move(outcome);
+      if (--progress->missing > 0) return;
+      progress->reply.winner = select_winner(progress->reply.outcomes, progress->incumbent);
+      if (progress->on_reply) progress->on_reply(std::move(progress->reply));
+      progress->replied = true;
+      progress->done.notify_all();
+    };
+  }
+
+ private:
   struct Progress {
-    std::mutex mutex;  // guards reply and missing
-    std::condition_variable_any done;
+    std::mutex mutex;  // guards everything; held during on_reply, which is quick
+    std::condition_variable done;
     BatchReply reply;
-    std::size_t missing = 0;
+    std::uint32_t missing = 0;
+    double incumbent = kInfinity;
+    OnReply on_reply;
+    bool replied = false;
   };
-  const auto progress = std::make_shared<Progress>();
+
+  std::shared_ptr<Progress> progress_;  // with the threads
+  BatchRunPtr run_;
+};
+
+Result<std::unique_ptr<AsyncPool::Ticket>> ThreadPool::submit(const RolloutBatch& batch, OnReply on_reply) {
   const auto run = std::make_shared<BatchRun>();
   {
     const std::lock_guard lock(mutex_);
@@ -45,34 +88,17 @@ Result<BatchReply> ThreadPool::run(const RolloutBatch& batch, TimePoint deadline
     return ok.error();
   }
   run->batch = batch;
-  progress->reply.outcomes.resize(batch.samples);
-  progress->missing = batch.samples;
-  run->on_outcome = [this, progress, first = batch.first_sample](RolloutOutcome outcome, int thread) {
+  auto running = std::make_unique<Running>(run, std::move(on_reply));
+  run->on_outcome = [this, receive = running->receiver()](RolloutOutcome outcome, int thread) {
     {
       const std::lock_guard lock(mutex_);
       workers_[static_cast<std::size_t>(thread)].rollouts += 1;
       workers_[static_cast<std::size_t>(thread)].engine_steps += outcome.engine_steps;
     }
-    const std::lock_guard lock(progress->mutex);
-    progress->reply.outcomes[outcome.sample - first] = std::move(outcome);
-    if (--progress->missing == 0) progress->done.notify_all();
+    receive(std::move(outcome));
   };
   for (std::uint32_t i = 0; i < batch.samples; ++i) executor_.submit(run, batch.first_sample + i);
-
-  std::unique_lock lock(progress->mutex);
-  const auto complete = [&] { return progress->missing == 0; };
-  if (!progress->done.wait_until(lock, stop, deadline, complete)) {
-    // Running samples notice within one engine step; waiting for them keeps
-    // the promise that nothing of this batch runs after the call.
-    run->signals.cancel();
-    const std::size_t late = progress->missing;
-    progress->done.wait(lock, complete);
-    if (stop.stop_requested()) return Error{Code::kCancelled, "batch: cancelled by its caller"};
-    return Error{Code::kDeadline,
-                 fmt::format("batch: {} of {} rollouts were unfinished at the deadline", late, batch.samples)};
-  }
-  progress->reply.winner = select_winner(progress->reply.outcomes, batch.incumbent);
-  return std::move(progress->reply);
+  return std::unique_ptr<Ticket>(std::move(running));
 }
 
 PoolStatus ThreadPool::status() const {

@@ -11,17 +11,19 @@
 
 namespace jostle::physics_pool {
 
-/// Pool of threads in this process. Destroy it after every `run` has returned.
-class ThreadPool final : public Pool {
+/// Pool of threads in this process. Destroy it after every `run` has returned and
+/// every ticket is gone; a ticket that goes waits for what runs (a millisecond).
+class ThreadPool final : public AsyncPool {
  public:
   explicit ThreadPool(int threads);
 
   Result<Hash> load(const Scene& scene) override;
-  Result<BatchReply> run(const RolloutBatch& batch, TimePoint deadline,
-                         std::stop_token stop = {}) override;
+  Result<std::unique_ptr<Ticket>> submit(const RolloutBatch& batch, OnReply on_reply) override;
   PoolStatus status() const override;
 
  private:
+  class Running;
+
   mutable std::mutex mutex_;  // guards worlds_ and workers_
   std::unordered_map<Hash, WorldPtr> worlds_;
   std::vector<WorkerStatus> workers_;

@@ -47,7 +47,7 @@ bool fits(const RolloutBatch& batch, const RolloutOutcome& outcome) {
 
 }  // namespace
 
-/// A batch between begin() and end().
+/// A batch between submit() and its reply.
 struct RemotePool::Active {
   Epoch epoch = 0;
   RolloutBatch batch;
@@ -56,8 +56,8 @@ struct RemotePool::Active {
   double best_cost = kInfinity;
   std::uint32_t first_success = UINT32_MAX;
   TimePoint started;
+  OnReply on_reply;
   bool ended = false;
-  std::optional<Error> error;
 };
 
 RemotePool::RemotePool(const dds::Participant& participant, const RemotePoolOptions& options)
@@ -116,7 +116,28 @@ Result<Hash> RemotePool::load(const physics_pool::Scene& scene) {
   return hash;
 }
 
-Result<std::shared_ptr<RemotePool::Active>> RemotePool::begin(const RolloutBatch& batch) {
+// A ticket; the batch's end and its own are both under the pool's mutex.
+class RemotePool::Underway final : public Ticket {
+ public:
+  Underway(RemotePool& pool, std::shared_ptr<Active> active) : pool_(pool), active_(std::move(active)) {}
+
+  ~Underway() override {
+    const std::lock_guard lock(pool_.mutex_);
+    if (!active_->ended) pool_.forget(*active_);
+  }
+
+  std::uint32_t missing() const override {
+    const std::lock_guard lock(pool_.mutex_);
+    return active_->ended ? 0 : pool_.scheduler_.missing(active_->epoch);
+  }
+
+ private:
+  RemotePool& pool_;
+  std::shared_ptr<Active> active_;
+};
+
+Result<std::unique_ptr<physics_pool::AsyncPool::Ticket>> RemotePool::submit(const RolloutBatch& batch,
+                                                                             OnReply on_reply) {
   const std::lock_guard lock(mutex_);
   const auto world = worlds_.find(batch.world);
   if (world == worlds_.end()) {
@@ -129,6 +150,7 @@ Result<std::shared_ptr<RemotePool::Active>> RemotePool::begin(const RolloutBatch
   active->epoch = ++last_epoch_;
   active->batch = batch;
   active->wire = convert::to_wire(batch);
+  active->on_reply = std::move(on_reply);
   active->started = std::chrono::steady_clock::now();
   active->reply.outcomes.resize(batch.samples);
   for (std::uint32_t i = 0; i < batch.samples; ++i) {
@@ -137,35 +159,7 @@ Result<std::shared_ptr<RemotePool::Active>> RemotePool::begin(const RolloutBatch
   active_[active->epoch] = active;
   scheduler_.start(active->epoch, batch.first_sample, batch.samples);
   kick();
-  return active;
-}
-
-Result<BatchReply> RemotePool::run(const RolloutBatch& batch, TimePoint deadline, std::stop_token stop) {
-  auto begin_result = begin(batch);
-  if (!begin_result) return begin_result.error();
-  Active& active = **begin_result;
-
-  std::unique_lock lock(mutex_);
-  const auto workers_missing_at = [&] {
-    return std::max(last_usable_, active.started) + options_.no_worker_timeout;
-  };
-  while (!active.ended) {
-    const TimePoint until = std::min(deadline, workers_missing_at());
-    if (changed_.wait_until(lock, stop, until, [&] { return active.ended; })) break;
-    const auto now = std::chrono::steady_clock::now();
-    if (stop.stop_requested()) {
-      end(active, Error{Code::kCancelled, "batch: cancelled by its caller"});
-    } else if (now >= deadline) {
-      end(active, Error{Code::kDeadline,
-                        fmt::format("batch: {} of {} rollouts were unfinished at the deadline",
-                                    scheduler_.missing(active.epoch), batch.samples)});
-    } else if (now >= workers_missing_at()) {
-      end(active, no_worker());
-    }
-  }
-  if (active.error) return *active.error;
-  active.reply.winner = physics_pool::select_winner(active.reply.outcomes, batch.incumbent);
-  return std::move(active.reply);
+  return std::unique_ptr<Ticket>(std::make_unique<Underway>(*this, active));
 }
 
 Error RemotePool::no_worker() const {
@@ -177,16 +171,27 @@ Error RemotePool::no_worker() const {
   return {Code::kUnavailable, std::move(message)};
 }
 
-// Ends a batch for its caller and, if need be, for the workers.
-void RemotePool::end(Active& active, std::optional<Error> error) {
+void RemotePool::give_up_without_workers(TimePoint now) {
+  std::vector<std::shared_ptr<Active>> hopeless;
+  for (const auto& [epoch, active] : active_) {
+    if (now >= std::max(last_usable_, active->started) + options_.no_worker_timeout) hopeless.push_back(active);
+  }
+  for (const auto& active : hopeless) finish(*active, no_worker());
+}
+
+void RemotePool::finish(Active& active, Result<BatchReply> reply) {
+  forget(active);
+  active.on_reply(std::move(reply));
+}
+
+// Of a batch that ended, or that nobody waits for any more; the workers may have to be told.
+void RemotePool::forget(Active& active) {
   active.ended = true;
-  active.error = std::move(error);
   if (scheduler_.finish(active.epoch)) {
     outgoing_.controls.push_back(control(client_, active.epoch, ControlKind::kCancel));
     kick();
   }
-  active_.erase(active.epoch);  // the caller holds another share
-  changed_.notify_all();
+  active_.erase(active.epoch);  // its ticket holds another share
 }
 
 void RemotePool::dispatch(std::stop_token stop) {
@@ -200,6 +205,7 @@ void RemotePool::dispatch(std::stop_token stop) {
     absorb_heartbeats(now, strangers);
     const std::vector<WorkerId> forgotten = scheduler_.check_silence(now);
     if (scheduler_.usable_workers(now) > 0) last_usable_ = now;
+    give_up_without_workers(now);
     prepare_tasks(now);
     const Outgoing outgoing = std::exchange(outgoing_, {});
 
@@ -261,11 +267,11 @@ void RemotePool::absorb(const msg::TaskResult& result, TimePoint now) {
   const bool refused = !result.error().empty();
   if (refused && outcome_result.error().code != Code::kUnknownWorld) {
     const Error& error = outcome_result.error();
-    end(*active, Error{error.code, fmt::format("worker {:016x}: {}", result.worker(), error.message)});
+    finish(*active, Error{error.code, fmt::format("worker {:016x}: {}", result.worker(), error.message)});
     return;
   }
   if (!outcome_result || !fits(active->batch, *outcome_result)) {
-    // Others may do better; run() gives up when nobody is left.
+    // Others may do better; the batch is given up when nobody is left.
     last_refusal_ = fmt::format("worker {:016x}: {}", result.worker(),
                                 outcome_result ? "its result does not fit the batch"
                                                : outcome_result.error().message);
@@ -274,7 +280,9 @@ void RemotePool::absorb(const msg::TaskResult& result, TimePoint now) {
   }
   if (!scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps())) return;
   adopt(*active, std::move(outcome_result).value());
-  if (scheduler_.missing(active->epoch) == 0) end(*active, {});
+  if (scheduler_.missing(active->epoch) > 0) return;
+  active->reply.winner = physics_pool::select_winner(active->reply.outcomes, active->batch.incumbent);
+  finish(*active, std::move(active->reply));
 }
 
 // Keeps an outcome and tells the siblings what it means for them.

@@ -19,7 +19,7 @@
 namespace jostle::services {
 
 struct RemotePoolOptions {
-  /// How long run() tolerates that no worker can be used.
+  /// How long a batch tolerates that no worker can be used.
   std::chrono::milliseconds no_worker_timeout{10'000};
   SchedulerOptions scheduler;
 };
@@ -33,16 +33,14 @@ struct RemotePoolOptions {
 ///          batch's error; it names the worker.
 /// Failure  a worker that dies, stalls or cannot do its work loses nothing:
 ///          its samples go to others.
-class RemotePool final : public physics_pool::Pool {
+class RemotePool final : public physics_pool::AsyncPool {
  public:
   RemotePool(const dds::Participant& participant, const RemotePoolOptions& options = {});
-  /// After every `run` has returned.
+  /// After every `run` has returned and every ticket is gone.
   ~RemotePool() override;
 
   Result<Hash> load(const physics_pool::Scene& scene) override;
-  Result<physics_pool::BatchReply> run(const physics_pool::RolloutBatch& batch,
-                                       physics_pool::TimePoint deadline,
-                                       std::stop_token stop = {}) override;
+  Result<std::unique_ptr<Ticket>> submit(const physics_pool::RolloutBatch& batch, OnReply on_reply) override;
   physics_pool::PoolStatus status() const override;
 
   /// Whether `count` workers could be used by the deadline.
@@ -50,6 +48,7 @@ class RemotePool final : public physics_pool::Pool {
 
  private:
   struct Active;
+  class Underway;
   using Control = jostle_msgs::msg::BatchControl;
   using Task = jostle_msgs::msg::Task;
   /// What leaves in one turn of the dispatcher.
@@ -58,8 +57,8 @@ class RemotePool final : public physics_pool::Pool {
     std::vector<std::pair<WorkerId, Task>> tasks;
   };
 
-  Result<std::shared_ptr<Active>> begin(const physics_pool::RolloutBatch& batch);
   Error no_worker() const;
+  void give_up_without_workers(physics_pool::TimePoint now);
 
   void dispatch(std::stop_token stop);
   void connect(const std::vector<WorkerId>& workers);
@@ -69,7 +68,8 @@ class RemotePool final : public physics_pool::Pool {
   void absorb(const jostle_msgs::msg::TaskResult& result, physics_pool::TimePoint now);
   void adopt(Active& active, physics_pool::RolloutOutcome outcome);
   void prepare_tasks(physics_pool::TimePoint now);
-  void end(Active& active, std::optional<Error> error);
+  void finish(Active& active, Result<physics_pool::BatchReply> reply);
+  void forget(Active& active);
   void kick();
 
   const dds::Participant participant_;
@@ -77,12 +77,12 @@ class RemotePool final : public physics_pool::Pool {
   const std::uint64_t client_;
 
   mutable std::mutex mutex_;  // guards everything down to kicked_
-  mutable std::condition_variable_any changed_;  // batches ended, workers came or went
+  mutable std::condition_variable_any changed_;  // workers came or went
   std::condition_variable_any wake_;             // of the dispatcher
   Scheduler scheduler_;
   Epoch last_epoch_;
   std::unordered_map<Hash, std::pair<StateLayout, double>> worlds_;  // and their time steps, s
-  std::map<Epoch, std::shared_ptr<Active>> active_;  // shared with the run() that waits
+  std::map<Epoch, std::shared_ptr<Active>> active_;  // shared with its ticket
   std::vector<jostle_msgs::msg::TaskResult> results_;
   std::vector<jostle_msgs::msg::WorkerHeartbeat> heartbeats_;
   Outgoing outgoing_;

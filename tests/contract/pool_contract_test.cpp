@@ -46,14 +46,14 @@ struct Rig {
 
   std::vector<WorkerProcess> workers;
   std::optional<dds::Participant> participant;
-  std::unique_ptr<Pool> pool;
+  std::unique_ptr<AsyncPool> pool;
 };
 
 // Starting workers takes longer than most tests, so consecutive tests of one
 // implementation share them.
 class PoolContract : public ::testing::TestWithParam<Implementation> {
  protected:
-  static Pool& pool() {
+  static AsyncPool& pool() {
     if (!rig_ || owner_ != GetParam().name) {
       rig_.reset();
       rig_ = std::make_unique<Rig>(GetParam());
@@ -80,7 +80,7 @@ class PoolContract : public ::testing::TestWithParam<Implementation> {
   }
 
   const Scene scene = small_scene();
-  Pool& sut = pool();
+  AsyncPool& sut = pool();
 
  private:
   friend class EndOfRig;
@@ -333,6 +333,55 @@ TEST_P(PoolContract, TwoThreadsMayRunAtOnce) {
   ASSERT_TRUE(theirs) << theirs.error().message;
   EXPECT_EQ(fingerprints(mine), fingerprints(run(here)));
   EXPECT_EQ(fingerprints(*theirs), fingerprints(run(there)));
+}
+
+TEST_P(PoolContract, ManySubmittedBatchesReplyOnceEach) {
+  constexpr std::size_t kBatches = 40;
+  std::mutex mutex;  // guards replies
+  std::condition_variable arrived;
+  std::vector<std::vector<Hash>> replies(kBatches);
+  std::size_t count = 0;
+  RolloutBatch batch = push_batch(scene, 1);
+  batch.stop_losers = false;
+  std::vector<std::unique_ptr<AsyncPool::Ticket>> tickets;
+  for (std::uint32_t i = 0; i < kBatches; ++i) {
+    batch.first_sample = i;
+    auto ticket_result = sut.submit(batch, [&, i](Result<BatchReply> reply_result) {
+      const std::lock_guard lock(mutex);
+      if (reply_result) replies[i] = fingerprints(*reply_result);
+      ++count;
+      arrived.notify_one();
+    });
+    ASSERT_TRUE(ticket_result) << ticket_result.error().message;
+    tickets.push_back(std::move(ticket_result).value());
+  }
+  {
+    std::unique_lock lock(mutex);
+    ASSERT_TRUE(arrived.wait_until(lock, in(kPatience), [&] { return count == kBatches; }));
+  }
+  for (const auto& ticket : tickets) EXPECT_EQ(ticket->missing(), 0u);
+  tickets.clear();
+
+  EXPECT_EQ(count, kBatches);
+  batch.first_sample = 0;
+  batch.samples = kBatches;
+  std::vector<Hash> together = fingerprints(reference(batch)), apart;
+  for (const auto& reply : replies) apart.insert(apart.end(), reply.begin(), reply.end());
+  EXPECT_EQ(apart, together);
+}
+
+TEST_P(PoolContract, TicketThatGoesCancelsItsBatch) {
+  std::atomic<int> calls = 0;
+  auto ticket_result = sut.submit(wait_batch(scene, 8, 10s), [&](Result<BatchReply>) { ++calls; });
+  ASSERT_TRUE(ticket_result);
+  EXPECT_EQ((*ticket_result)->missing(), 8u);
+
+  const auto start = Clock::now();
+  ticket_result->reset();
+  run(wait_batch(scene, 4, 1ms));
+
+  EXPECT_LT(Clock::now() - start, 2s);
+  EXPECT_EQ(calls, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, PoolContract,

@@ -8,42 +8,36 @@
 #include <numbers>
 #include <set>
 
+#include "physics_pool/scene/outline.hpp"
 #include "physics_pool/scene/planar_gripper.hpp"
 
 namespace jostle::physics_pool {
 namespace {
 
-// A footprint is a rectangle or a disc in the surface's plane.
+// An outline somewhere in the surface's plane.
 struct Footprint {
   double x = 0.0, y = 0.0, yaw = 0.0;
-  double half_x = 0.0, half_y = 0.0;  // rectangle
-  double radius = 0.0;                // disc, where > 0
+  Outline outline;
 };
 
 Footprint footprint(const SceneObject& object) {
-  Footprint result{.x = object.x, .y = object.y, .yaw = object.yaw};
-  if (object.shape == Shape::kCylinder) {
-    result.radius = object.radius;
-  } else {
-    result.half_x = object.size[0] / 2;
-    result.half_y = object.size[1] / 2;
-  }
-  return result;
+  return {.x = object.x, .y = object.y, .yaw = object.yaw, .outline = outline(object)};
 }
 
-Footprint footprint(const Disc& disc) { return {.x = disc.x, .y = disc.y, .radius = disc.radius}; }
+Footprint footprint(const Disc& disc) {
+  return {.x = disc.x, .y = disc.y, .outline = {.radius = disc.radius}};
+}
 
 std::vector<Footprint> footprint(const SceneRobot& robot) {
   namespace hand = planar_gripper;
-  if (robot.is_pusher()) return {{.x = robot.x, .y = robot.y, .radius = robot.radius}};
+  if (robot.is_pusher()) return {footprint(Disc{robot.x, robot.y, robot.radius})};
   const double c = std::cos(robot.rotation), s = std::sin(robot.rotation);
   const auto part = [&](double x_min, double x_max, double y, double width) {
     const double x = (x_min + x_max) / 2;
     return Footprint{.x = robot.x + c * x - s * y,
                      .y = robot.y + s * x + c * y,
                      .yaw = robot.rotation,
-                     .half_x = (x_max - x_min) / 2,
-                     .half_y = width / 2};
+                     .outline = {.half_x = (x_max - x_min) / 2, .half_y = width / 2}};
   };
   const double finger_y = (robot.opening + hand::kFingerThickness) / 2;
   return {part(0, hand::kFingerLength, finger_y, hand::kFingerThickness),
@@ -54,12 +48,8 @@ std::vector<Footprint> footprint(const SceneRobot& robot) {
 
 double disc_gap(const Footprint& disc, const Footprint& other) {
   const double dx = disc.x - other.x, dy = disc.y - other.y;
-  if (other.radius > 0) return std::hypot(dx, dy) - disc.radius - other.radius;
-  const double c = std::cos(other.yaw), s = std::sin(other.yaw);
-  const double along = std::abs(c * dx + s * dy) - other.half_x;
-  const double across = std::abs(-s * dx + c * dy) - other.half_y;
-  const double outside = std::hypot(std::max(along, 0.0), std::max(across, 0.0));
-  return outside + std::min(std::max(along, across), 0.0) - disc.radius;
+    const double c = std::cos(other.yaw), s = std::sin(other.yaw);
+  return nearest(other.outline, c * dx + s * dy, -s * dx + c * dy).distance - disc.outline.radius;
 }
 
 // The largest separation along any of the four edge normals: exact where
@@ -69,7 +59,7 @@ double rectangle_gap(const Footprint& a, const Footprint& b) {
   const double dx = b.x - a.x, dy = b.y - a.y;
   for (const double yaw : {a.yaw, a.yaw + std::numbers::pi / 2, b.yaw, b.yaw + std::numbers::pi / 2}) {
     const auto reach = [&](const Footprint& f) {
-      return f.half_x * std::abs(std::cos(f.yaw - yaw)) + f.half_y * std::abs(std::sin(f.yaw - yaw));
+      return f.outline.half_x * std::abs(std::cos(f.yaw - yaw)) + f.outline.half_y * std::abs(std::sin(f.yaw - yaw));
     };
     const double centres = std::abs(dx * std::cos(yaw) + dy * std::sin(yaw));
     gap = std::max(gap, centres - reach(a) - reach(b));
@@ -78,8 +68,8 @@ double rectangle_gap(const Footprint& a, const Footprint& b) {
 }
 
 double footprint_gap(const Footprint& a, const Footprint& b) {
-  if (a.radius > 0) return disc_gap(a, b);
-  if (b.radius > 0) return disc_gap(b, a);
+  if (a.outline.radius > 0) return disc_gap(a, b);
+  if (b.outline.radius > 0) return disc_gap(b, a);
   return rectangle_gap(a, b);
 }
 

@@ -1,0 +1,51 @@
+#include "physics_pool/coarse/coarse_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics_pool/coarse/kinematic.hpp"
+#include "physics_pool/coarse/quasi_static.hpp"
+
+namespace jostle::physics_pool {
+
+Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, const Scene& scene) {
+  if (!scene.robot.is_pusher()) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("scene '{}': robot.model: got '{}', wanted pusher: coarse models know no other robot",
+                             scene.name, scene.robot.model)};
+  }
+  std::unique_ptr<CoarseModel> model;
+  if (name == "kinematic") model = std::make_unique<KinematicModel>(scene);
+  if (name == "limit-surface") {
+    model = std::make_unique<QuasiStaticModel>(scene, QuasiStaticOptions{.sliders_touch = false});
+  }
+  if (name == "planar") model = std::make_unique<QuasiStaticModel>(scene, QuasiStaticOptions{});
+  if (model) return model;
+  return Error{Code::kInvalidArgument,
+               fmt::format("coarse model: got '{}', wanted kinematic, limit-surface, planar, learned or learned:FILE",
+                           name)};
+}
+
+void to_planar(const StateLayout& layout, const State& x, std::span<double> planar) {
+  const PlanarLayout at{static_cast<int>(layout.objects.size())};
+  std::copy_n(x.q.begin(), 2, planar.begin());
+  std::copy_n(x.v.begin(), 2, planar.begin() + at.pusher_velocity());
+  for (int i = 0; i < at.sliders; ++i) {
+    const ObjectSlot& slot = layout.objects[static_cast<std::size_t>(i)];
+    const double* q = &x.q[static_cast<std::size_t>(slot.q)];
+    const double* v = &x.v[static_cast<std::size_t>(slot.v)];
+    const double w = q[3], a = q[4], b = q[5], c = q[6];
+    double* pose = &planar[static_cast<std::size_t>(at.pose(i))];
+    pose[0] = q[0];
+    pose[1] = q[1];
+    pose[2] = std::atan2(2 * (w * c + a * b), 1 - 2 * (b * b + c * c));
+    double* velocity = &planar[static_cast<std::size_t>(at.velocity(i))];
+    velocity[0] = v[0];
+    velocity[1] = v[1];
+    velocity[2] = v[5];  // about the body's z axis, which is upright
+  }
+}
+
+}  // namespace jostle::physics_pool

@@ -19,12 +19,14 @@ namespace jostle::physics_pool {
 ///
 /// d_free is how far the pusher goes before it touches the slider, d_contact the
 /// rest; r_c leads from the contact to the slider's centre, theta from u to r_c. The
-/// touch is found by following the signed distance, so any outline will do.
+/// touch is found by following the signed distance, so any outline will do. The thesis
+/// does not give K_omega; 1/2 is what quasi-static friction makes of a push that
+/// sticks as far from the centre as the support is: omega = (u x r)/(c^2 + r^2).
 /// Sliders do not meet each other.
 class KinematicModel final : public CoarseModel {
  public:
   /// `rotation_gain`: K_omega.
-  explicit KinematicModel(const Scene& scene, double rotation_gain = 1.0);
+  explicit KinematicModel(const Scene& scene, double rotation_gain = 0.5);
 
   std::string_view name() const override { return "kinematic"; }
   PlanarLayout layout() const override { return layout_; }

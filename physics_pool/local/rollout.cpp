@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "physics_pool/objective/bound.hpp"
+#include "physics_pool/objective/tally.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -36,24 +37,14 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
   const auto obsolete = [&signals, sample] { return signals.is_obsolete(sample); };
 
   RolloutOutcome outcome{.sample = sample};
-  outcome.trajectory.reserve(static_cast<std::size_t>(steps) + 1);
-  outcome.trajectory.push_back(batch.x0);
+  Tally tally(geometry, batch, controls, outcome);
   State x = batch.x0;
-  double sum = 0.0;
   const auto finish = [&](End end) {
-    outcome.end = end;
-    outcome.steps = static_cast<std::uint32_t>(outcome.step_costs.size());
-    outcome.grasped = grasped(geometry, outcome.trajectory.back(), objective);
-    if (end == End::kCompleted || end == End::kSucceeded) outcome.cost = sum;
-    // Only a possible winner's states are worth their way.
-    const bool may_win = end == End::kSucceeded || (end == End::kCompleted && sum < batch.incumbent);
-    if (!may_win && !batch.want_all_trajectories) outcome.trajectory.clear();
+    tally.close(end);
     return std::move(outcome);
   };
 
   for (int t = 0; t < steps; ++t) {
-    const auto u_before = t == 0 ? std::span<const double>(batch.u_before)
-                                 : std::as_const(controls).step(t - 1);
     const auto u = std::as_const(controls).step(t);
     auto advance = dynamics.advance(x, u, engine_steps, obsolete);
     outcome.engine_steps += advance.engine_steps;
@@ -63,26 +54,13 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
       outcome.reason = std::move(advance.diverged);
       return finish(End::kDiverged);
     }
-    const double running =
-        running_cost(geometry, objective, u_before, u, outcome.trajectory.back(), x);
-    sum += running;
-    outcome.step_costs.push_back(running);
-    outcome.trajectory.push_back(x);
-
-    const bool last = t + 1 == steps;
-    const double goal = final_cost(geometry, objective, x);
-    if (batch.stop_on_success && t >= batch.min_steps && sum + goal <= objective.success_cost &&
-        grasped(geometry, x, objective)) {
-      sum += goal;
-      outcome.step_costs.back() += goal;
-      signals.offer_success(sample);
-      return finish(End::kSucceeded);
+    if (const std::optional<End> end = tally.count(x)) {
+      if (*end == End::kSucceeded) signals.offer_success(sample);
+      if (*end == End::kCompleted) signals.offer_cost(tally.sum());
+      return finish(*end);
     }
-    if (last) {
-      sum += goal;
-      outcome.step_costs.back() += goal;
-    }
-    if (last || !batch.stop_losers) continue;
+    if (!batch.stop_losers) continue;
+    const double sum = tally.sum();
     const bool can_succeed = batch.stop_on_success && sum <= objective.success_cost;
     if (!can_succeed && (sum >= batch.incumbent || sum > signals.best())) return finish(End::kLost);
     // Never against a sibling, whose news come sooner or later: should the bound's
@@ -91,8 +69,7 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
     const Outlook ahead = outlook(geometry, objective, controls, t + 1, u, x, batch.step_duration);
     if (!(can_succeed && ahead.may_grasp) && sum + ahead.cost >= batch.incumbent) return finish(End::kLost);
   }
-  signals.offer_cost(sum);
-  return finish(End::kCompleted);
+  return finish(End::kCompleted);  // no steps at all: a batch has at least one
 }
 
 }  // namespace jostle::physics_pool

@@ -61,8 +61,8 @@ std::string objection(std::string_view file, std::string_view include) {
                : "";
   }
   if (starts_with_any(file, {"physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
-                             "physics_pool/sampling/"})) {
-    return allow({"idl/types/", "physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
+                             "physics_pool/sampling/", "physics_pool/coarse/", "physics_pool/parareal/"})) {
+    return allow({"idl/types/", "physics_pool/coarse/", "physics_pool/parareal/", "physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
                   "physics_pool/sampling/"},
                  "the engine-free half of physics_pool knows values only");
   }

@@ -1,0 +1,56 @@
+#pragma once
+/// \file
+/// Parareal's arithmetic on states: corrections in the plane, and their feasibility.
+
+#include <span>
+#include <vector>
+
+#include "physics_pool/coarse/coarse_model.hpp"
+#include "physics_pool/coarse/contact.hpp"
+
+namespace jostle::physics_pool {
+
+/// What coarse models know lies in the plane; height and tilt of a slider are always
+/// those of the state that is corrected. Poses are updated in tangent space: a
+/// slider is moved and turned about the vertical, its quaternion stays one.
+///
+/// Threads  immutable; safe from any.
+class PlanarUpdate {
+ public:
+  explicit PlanarUpdate(const Scene& scene);
+
+  /// x takes on a planar state: a coarse prediction becomes a full state. A slider
+  /// whose centre is beyond the surface's edge is put below it: it has fallen.
+  void replace(State& x, std::span<const double> planar) const;
+
+  /// x + (c_new - c_old): Eq. 6.3, where x is F(x_n^k) and the others are C(x_n^{k+1})
+  /// and C(x_n^k).
+  void correct(State& x, std::span<const double> c_new, std::span<const double> c_old) const;
+
+  /// Moves sliders, as little as it takes, until none is deeper in the pusher or in
+  /// another than kTolerance: Eq. 6.9 along contact normals, for any number of
+  /// bodies (Gauss-Seidel; two sliders share the way). The pusher stays.
+  void project(State& x) const;
+
+  static constexpr double kTolerance = 0.0005;  // m, as in the author's program
+
+  /// Largest distance, m, and rotation, rad, between the sliders of two states.
+  struct Change {
+    double translation = 0.0, rotation = 0.0;
+  };
+  Change change(const State& a, const State& b) const;
+
+  const StateLayout& layout() const { return layout_; }
+  PlanarLayout planar_layout() const { return {static_cast<int>(layout_.objects.size())}; }
+
+ private:
+  void displace(State& x, std::size_t slider, double dx, double dy, double turn) const;
+
+  StateLayout layout_;
+  double half_x_, half_y_;      // m, of the surface
+  Outline pusher_;
+  std::vector<Outline> outlines_;
+  std::vector<double> rest_heights_;
+};
+
+}  // namespace jostle::physics_pool

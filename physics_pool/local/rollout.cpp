@@ -43,7 +43,7 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
   const auto finish = [&](End end) {
     outcome.end = end;
     outcome.steps = static_cast<std::uint32_t>(outcome.step_costs.size());
-    outcome.grasped = grasped(geometry, outcome.trajectory.back(), objective);
+    outcome.at_goal = at_goal(geometry, outcome.trajectory.back(), objective);
     if (end == End::kCompleted || end == End::kSucceeded) outcome.cost = sum;
     // Only a possible winner's states are worth their way.
     const bool may_win = end == End::kSucceeded || (end == End::kCompleted && sum < batch.incumbent);
@@ -72,7 +72,7 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
     const bool last = t + 1 == steps;
     const double goal = final_cost(geometry, objective, x);
     if (batch.stop_on_success && t >= batch.min_steps && sum + goal <= objective.success_cost &&
-        grasped(geometry, x, objective)) {
+        at_goal(geometry, x, objective)) {
       sum += goal;
       outcome.step_costs.back() += goal;
       signals.offer_success(sample);
@@ -89,7 +89,7 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
     // assumption fail, the plan is another one, but the same one everywhere.
     if (!batch.stop_hopeless) continue;
     const Outlook ahead = outlook(geometry, objective, controls, t + 1, u, x, batch.step_duration);
-    if (!(can_succeed && ahead.may_grasp) && sum + ahead.cost >= batch.incumbent) return finish(End::kLost);
+    if (!(can_succeed && ahead.may_succeed) && sum + ahead.cost >= batch.incumbent) return finish(End::kLost);
   }
   signals.offer_cost(sum);
   return finish(End::kCompleted);

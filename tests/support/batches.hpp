@@ -43,7 +43,7 @@ inline physics_pool::RolloutBatch wait_batch(const physics_pool::Scene& scene, s
 /// The bits of an outcome that must not depend on who ran it.
 inline Hash fingerprint(const physics_pool::RolloutOutcome& outcome) {
   std::vector<double> all{static_cast<double>(outcome.sample), static_cast<double>(outcome.end),
-                          outcome.cost, static_cast<double>(outcome.grasped)};
+                          outcome.cost, static_cast<double>(outcome.at_goal)};
   all.insert(all.end(), outcome.step_costs.begin(), outcome.step_costs.end());
   for (const State& x : outcome.trajectory) {
     all.insert(all.end(), x.q.begin(), x.q.end());

@@ -31,6 +31,10 @@ msg::ObjectiveWeights to_wire(const Objective& objective) {
   wire.drop(objective.drop);
   wire.drop_height(objective.drop_height);
   wire.obstruction(objective.obstruction);
+  wire.obstacle_target(objective.obstacle_target);
+  wire.obstacle_pusher(objective.obstacle_pusher);
+  wire.obstacle_nearest(objective.obstacle_nearest);
+  wire.intrusion(objective.intrusion);
   wire.success_cost(objective.success_cost);
   return wire;
 }
@@ -50,6 +54,10 @@ Objective from_wire(const msg::ObjectiveWeights& wire) {
           .drop = wire.drop(),
           .drop_height = wire.drop_height(),
           .obstruction = wire.obstruction(),
+          .obstacle_target = wire.obstacle_target(),
+          .obstacle_pusher = wire.obstacle_pusher(),
+          .obstacle_nearest = wire.obstacle_nearest(),
+          .intrusion = wire.intrusion(),
           .success_cost = wire.success_cost()};
 }
 
@@ -151,7 +159,7 @@ msg::TaskResult to_wire(const RolloutOutcome& outcome) {
   wire.steps(outcome.steps);
   wire.engine_steps(outcome.engine_steps);
   wire.thawed(outcome.thawed);
-  wire.grasped(outcome.grasped);
+  wire.at_goal(outcome.at_goal);
   wire.step_costs(outcome.step_costs);
   wire.reason(outcome.reason);
   if (!outcome.trajectory.empty()) {
@@ -187,7 +195,7 @@ Result<RolloutOutcome> from_wire(const msg::TaskResult& wire) {
                         .steps = wire.steps(),
                         .engine_steps = wire.engine_steps(),
                         .thawed = wire.thawed(),
-                        .grasped = wire.grasped(),
+                        .at_goal = wire.at_goal(),
                         .step_costs = wire.step_costs(),
                         .trajectory = std::move(trajectory_result).value(),
                         .reason = wire.reason()};

@@ -26,6 +26,8 @@ Result<void> check_finite(const char* field, const std::vector<double>& values) 
                "a finite number");
 }
 
+constexpr double kLeastNearest = 1e-3;  // m
+
 Result<void> check_weights(const Objective& o) {
   const std::pair<const char*, double> weights[] = {
       {"goal", o.goal}, {"angle", o.angle}, {"acceleration", o.acceleration},
@@ -33,11 +35,16 @@ Result<void> check_weights(const Objective& o) {
       {"edge", o.edge}, {"edge_rate", o.edge_rate}, {"edge_exponent_max", o.edge_exponent_max},
       {"edge_margin", o.edge_margin}, {"topple", o.topple}, {"topple_angle", o.topple_angle},
       {"drop", o.drop}, {"drop_height", o.drop_height},
-      {"obstruction", o.obstruction}, {"success_cost", o.success_cost}};
+      {"obstruction", o.obstruction}, {"obstacle_target", o.obstacle_target},
+      {"obstacle_pusher", o.obstacle_pusher}, {"intrusion", o.intrusion}, {"success_cost", o.success_cost}};
   for (const auto& [name, value] : weights) {
     if (value >= 0 && std::isfinite(value)) continue;
     return wrong(fmt::format("objective.{}", name), fmt::format("{}", value),
                  "a finite number >= 0, or rollouts could not be stopped early");
+  }
+  if (!(o.obstacle_nearest >= kLeastNearest && std::isfinite(o.obstacle_nearest))) {
+    return wrong("objective.obstacle_nearest", fmt::format("{} m", o.obstacle_nearest),
+                 fmt::format("a finite number >= {} m, or costs could be infinite", kLeastNearest));
   }
   return {};
 }

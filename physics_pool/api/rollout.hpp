@@ -101,7 +101,7 @@ struct RolloutOutcome {
   std::uint32_t steps = 0;         ///< control steps whose cost is known
   std::uint64_t engine_steps = 0;  ///< physics steps spent
   std::uint32_t thawed = 0;        ///< times a frozen object was touched and set free
-  bool grasped = false;            ///< target in the pre-grasp region at the last state
+  bool at_goal = false;            ///< the task's goal is reached at the last state
   std::vector<double> step_costs;  ///< [steps]; the last one carries the goal cost
   Trajectory trajectory;           ///< [steps + 1], or empty if not asked for
   std::string reason;              ///< why it diverged

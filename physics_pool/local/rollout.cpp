@@ -67,7 +67,7 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
     // assumption fail, the plan is another one, but the same one everywhere.
     if (!batch.stop_hopeless) continue;
     const Outlook ahead = outlook(geometry, objective, controls, t + 1, u, x, batch.step_duration);
-    if (!(can_succeed && ahead.may_grasp) && sum + ahead.cost >= batch.incumbent) return finish(End::kLost);
+    if (!(can_succeed && ahead.may_succeed) && sum + ahead.cost >= batch.incumbent) return finish(End::kLost);
   }
   return finish(End::kCompleted);  // no steps at all: a batch has at least one
 }

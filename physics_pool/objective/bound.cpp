@@ -32,22 +32,26 @@ Speeds larger(const Speeds& a, const Speeds& b) {
 
 Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls,
                 int done, std::span<const double> u_before, const State& x, double step_duration) {
-  const double distance = target_bearing(geometry, x).distance;
   Outlook outlook;
+  const bool grasps = !geometry.task.is_push();
+  const double distance = grasps ? target_bearing(geometry, x).distance : 0.0;
   double approach = kSlack, travelled = 0.0;
   std::span<const double> before = u_before;
   for (int t = done; t < controls.steps(); ++t) {
     const std::span<const double> u = controls.step(t);
     outlook.cost += objective.acceleration * acceleration_cost(before, u);
-    const Speeds fastest = larger(speeds(before), speeds(u));
-    travelled += fastest.translation * step_duration;
-    approach += (2 * fastest.translation + fastest.turning * (distance + travelled) + fastest.finger) * step_duration;
+    if (grasps) {
+      const Speeds fastest = larger(speeds(before), speeds(u));
+      travelled += fastest.translation * step_duration;
+      approach += (2 * fastest.translation + fastest.turning * (distance + travelled) + fastest.finger) * step_duration;
+    }
     before = u;
   }
-  const double nearest = std::max(distance - approach, 0.0);
   outlook.cost += objective.drop * count_dropped(geometry, x, objective.drop_height) * (controls.steps() - done);
+  if (!grasps) return outlook;
+  const double nearest = std::max(distance - approach, 0.0);
   outlook.cost += objective.goal * nearest * nearest;
-  outlook.may_grasp = nearest <= std::hypot(hand::kGraspFar, hand::kGraspSide);
+  outlook.may_succeed = nearest <= std::hypot(hand::kGraspFar, hand::kGraspSide);
   return outlook;
 }
 

@@ -13,7 +13,7 @@ namespace jostle::physics_pool {
 /// Of a rollout before control step `done`, whose controls are known.
 struct Outlook {
   double cost = 0.0;      ///< at least this is still to come: running costs and goal
-  bool may_grasp = true;  ///< the target can still come into the pre-grasp region
+  bool may_succeed = true;  ///< the goal can still be reached
 };
 
 /// Certain are the changes of control, and that what has dropped stays down. Of the
@@ -28,6 +28,8 @@ struct Outlook {
 /// hand and what turns with it at the target's distance would. A target that is
 /// squeezed out of a wedge or flung by a lever could; none of some thousand random
 /// pushes did (bound_test.cpp, and equal plans in `jostle bench cheap-physics`).
+/// Of a pushed target's way to its goal nothing is foretold: it may have been given
+/// any speed.
 ///
 /// `u_before`: control before step `done`.
 Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls,

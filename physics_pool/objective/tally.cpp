@@ -23,7 +23,7 @@ std::optional<End> Tally::count(const State& x) {
   const bool may_succeed = batch_.stop_on_success && t >= batch_.min_steps;
   if (!last && !may_succeed) return std::nullopt;
   const double goal = final_cost(geometry_, objective, x);
-  const bool succeeds = may_succeed && sum_ + goal <= objective.success_cost && grasped(geometry_, x, objective);
+  const bool succeeds = may_succeed && sum_ + goal <= objective.success_cost && at_goal(geometry_, x, objective);
   if (!last && !succeeds) return std::nullopt;
   sum_ += goal;
   outcome_.step_costs.back() += goal;
@@ -33,7 +33,7 @@ std::optional<End> Tally::count(const State& x) {
 void Tally::close(End end) {
   outcome_.end = end;
   outcome_.steps = static_cast<std::uint32_t>(outcome_.step_costs.size());
-  outcome_.grasped = grasped(geometry_, outcome_.trajectory.back(), batch_.objective);
+  outcome_.at_goal = at_goal(geometry_, outcome_.trajectory.back(), batch_.objective);
   if (end == End::kCompleted || end == End::kSucceeded) outcome_.cost = sum_;
   // Only a possible winner's states are worth their way.
   const bool may_win = end == End::kSucceeded || (end == End::kCompleted && sum_ < batch_.incumbent);

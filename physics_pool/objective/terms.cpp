@@ -41,6 +41,22 @@ double upright(const double* quaternion) {
   return 1 - 2 * (quaternion[1] * quaternion[1] + quaternion[2] * quaternion[2]);
 }
 
+// [x, y, ...] of object i in the world, m.
+const double* position(const TaskGeometry& geometry, const State& x, std::size_t i) {
+  return &x.q[static_cast<std::size_t>(geometry.layout.objects[i].q)];
+}
+
+double squared_distance(const Disc& disc, const double* p) {
+  const double dx = p[0] - disc.x, dy = p[1] - disc.y;
+  return dx * dx + dy * dy;
+}
+
+bool intrudes(const TaskGeometry& geometry, const State& x, std::size_t i) {
+  const Disc& goal = geometry.task.goal;
+  return geometry.task.is_push() && static_cast<int>(i) != geometry.layout.target &&
+         squared_distance(goal, position(geometry, x, i)) <= goal.radius * goal.radius;
+}
+
 bool is_dropped(const TaskGeometry& geometry, const State& x, std::size_t i, double height) {
   return x.q[geometry.layout.objects[i].q + 2] < geometry.rest_heights[i] - height;
 }
@@ -50,7 +66,10 @@ bool is_dropped(const TaskGeometry& geometry, const State& x, std::size_t i, dou
 TaskGeometry::TaskGeometry(const Scene& scene)
     : layout(layout_of(scene)),
       half_x(scene.surface.size[0] / 2),
-      half_y(scene.surface.size[1] / 2) {
+      half_y(scene.surface.size[1] / 2),
+      task(scene.task),
+      target(scene.objects.at(static_cast<std::size_t>(layout.target))),
+      pusher_radius(scene.robot.is_pusher() ? scene.robot.radius : 0.0) {
   for (const SceneObject& object : scene.objects) rest_heights.push_back(object.rest_height());
 }
 
@@ -59,12 +78,23 @@ TargetBearing target_bearing(const TaskGeometry& geometry, const State& x) {
   return {.distance = std::hypot(p.forward, p.left), .angle = std::abs(std::atan2(p.left, p.forward))};
 }
 
+double goal_distance(const TaskGeometry& geometry, const State& x) {
+  if (!geometry.task.is_push()) return target_bearing(geometry, x).distance;
+  const auto target = static_cast<std::size_t>(geometry.layout.target);
+  return std::sqrt(squared_distance(geometry.task.goal, position(geometry, x, target)));
+}
+
 double goal_cost(const TaskGeometry& geometry, const State& x, double angle_weight) {
+  if (geometry.task.is_push()) {
+    const auto target = static_cast<std::size_t>(geometry.layout.target);
+    return squared_distance(geometry.task.goal, position(geometry, x, target));
+  }
   const TargetBearing bearing = target_bearing(geometry, x);
   return bearing.distance * bearing.distance + angle_weight * bearing.angle * bearing.angle;
 }
 
 int count_obstructions(const TaskGeometry& geometry, const State& x) {
+  if (geometry.task.is_push()) return 0;
   int count = 0;
   for (std::size_t i = 0; i < geometry.layout.objects.size(); ++i) {
     if (static_cast<int>(i) == geometry.layout.target) continue;
@@ -121,6 +151,49 @@ int toppled_objects(const TaskGeometry& geometry, const State& x, double angle) 
   }));
 }
 
+double obstacle_cost(const TaskGeometry& geometry, const State& x, const Objective& objective) {
+  if (!geometry.task.obstacle) return 0.0;
+  const auto nearness = [&](const double* p) {
+    const double nearest = objective.obstacle_nearest * objective.obstacle_nearest;
+    return 1 / std::max(squared_distance(*geometry.task.obstacle, p), nearest);
+  };
+  const auto target = static_cast<std::size_t>(geometry.layout.target);
+  return objective.obstacle_target * nearness(position(geometry, x, target)) +
+         objective.obstacle_pusher * nearness(&x.q[kJointX]);
+}
+
+std::vector<int> intruders(const TaskGeometry& geometry, const State& x) {
+  std::vector<int> inside;
+  for (std::size_t i = 0; i < geometry.layout.objects.size(); ++i) {
+    if (intrudes(geometry, x, i)) inside.push_back(static_cast<int>(i));
+  }
+  return inside;
+}
+
+int count_intruders(const TaskGeometry& geometry, const State& x) {
+  int count = 0;
+  for (std::size_t i = 0; i < geometry.layout.objects.size(); ++i) count += intrudes(geometry, x, i) ? 1 : 0;
+  return count;
+}
+
+bool target_hits_obstacle(const TaskGeometry& geometry, const State& x) {
+  if (!geometry.task.obstacle) return false;
+  const double* p = position(geometry, x, static_cast<std::size_t>(geometry.layout.target));
+  SceneObject target = geometry.target;
+  target.x = p[0];
+  target.y = p[1];
+  const double* quaternion = p + 3;
+  target.yaw = std::atan2(2 * (quaternion[0] * quaternion[3] + quaternion[1] * quaternion[2]),
+                          1 - 2 * (quaternion[2] * quaternion[2] + quaternion[3] * quaternion[3]));
+  return signed_distance(target, *geometry.task.obstacle) < 0;
+}
+
+bool pusher_hits_obstacle(const TaskGeometry& geometry, const State& x) {
+  if (!geometry.task.obstacle) return false;
+  const double reach = geometry.pusher_radius + geometry.task.obstacle->radius;
+  return squared_distance(*geometry.task.obstacle, &x.q[kJointX]) < reach * reach;
+}
+
 std::vector<int> dropped_objects(const TaskGeometry& geometry, const State& x, double height) {
   std::vector<int> dropped;
   for (std::size_t i = 0; i < geometry.layout.objects.size(); ++i) {
@@ -137,15 +210,18 @@ int count_dropped(const TaskGeometry& geometry, const State& x, double height) {
   return count;
 }
 
-bool grasped(const TaskGeometry& geometry, const State& x, const Objective& objective) {
+bool at_goal(const TaskGeometry& geometry, const State& x, const Objective& objective) {
+  const auto target = static_cast<std::size_t>(geometry.layout.target);
+  if (is_dropped(geometry, x, target, objective.drop_height) ||
+      upright(&x.q[geometry.layout.objects[target].q + 3]) < std::cos(objective.topple_angle)) {
+    return false;
+  }
+  if (geometry.task.is_push()) return goal_distance(geometry, x) <= geometry.task.goal.radius;
   namespace hand = planar_gripper;
   const InHand p = target_in_hand(geometry, x);
-  const auto target = static_cast<std::size_t>(geometry.layout.target);
   return p.forward >= hand::kGraspNear && p.forward <= hand::kGraspFar &&
          p.left <= std::min(hand::kGraspSide, x.q[kJointLeft]) &&
-         p.left >= -std::min(hand::kGraspSide, x.q[kJointRight]) &&
-         !is_dropped(geometry, x, target, objective.drop_height) &&
-         upright(&x.q[geometry.layout.objects[target].q + 3]) >= std::cos(objective.topple_angle);
+         p.left >= -std::min(hand::kGraspSide, x.q[kJointRight]);
 }
 
 double running_cost(const TaskGeometry& geometry, const Objective& objective,
@@ -156,7 +232,9 @@ double running_cost(const TaskGeometry& geometry, const Objective& objective,
              disturbance_cost(geometry, x0, x1, objective.disturbance_rotation) +
          objective.edge * edge_cost(geometry, x0, x1, objective) +
          objective.topple * toppled_objects(geometry, x1, objective.topple_angle) +
-         objective.drop * count_dropped(geometry, x1, objective.drop_height);
+         objective.drop * count_dropped(geometry, x1, objective.drop_height) +
+         obstacle_cost(geometry, x1, objective) +
+         objective.intrusion * count_intruders(geometry, x1);
 }
 
 }  // namespace jostle::physics_pool

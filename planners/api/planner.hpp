@@ -31,9 +31,9 @@ struct Plan {
   ControlSequence controls;  ///< u_0 … u_{n-1}
   Trajectory states;         ///< x_0 … x_n, predicted
   double cost = physics_pool::kInfinity;
-  /// Target predicted in the hand at x_n, at a cost that says nothing failed on
-  /// the way (success_cost).
-  bool grasped = false;
+  /// The task's goal is predicted reached at x_n, at a cost that says nothing
+  /// failed on the way (success_cost).
+  bool at_goal = false;
   int iterations = 0;
   std::uint64_t rollouts = 0;
   int denials = 0;  ///< successes of reduced physics that full physics denied
@@ -43,7 +43,7 @@ struct Plan {
 struct Progress {
   int iteration = 0;  ///< 0: the initial candidate was scored
   double cost = 0.0;  ///< of the best sequence so far
-  bool grasped = false;
+  bool at_goal = false;
   std::uint64_t rollouts = 0;  ///< in this plan so far
   const State* final_state = nullptr;  ///< of the best sequence; valid during the call
 };

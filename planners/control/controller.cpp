@@ -78,14 +78,14 @@ class Run {
     if (outcome_.actions == acted_at_plan_) return plan_.controls.steps() == 0;  // fresh
     const bool deviated = state_deviation(layout(), plan_.states.front(), x_) > options_.deviation_threshold;
     const bool few_left = plan_.controls.steps() < std::max(options_.min_steps, 1);
-    return !plan_.grasped || deviated || few_left;
+    return !plan_.at_goal || deviated || few_left;
   }
 
   // Lines 11 and 12. Where the last plan fell short of the target the horizon
   // is filled up again, so that there is time to go round, and the iterations
   // grow.
   Result<void> replan() {
-    const int wanted = plan_.grasped ? plan_.controls.steps() + 1
+    const int wanted = plan_.at_goal ? plan_.controls.steps() + 1
                                      : std::max(plan_.controls.steps() + 1, options_.initial_steps);
     ControlSequence controls = plan_.controls;
     while (controls.steps() < wanted) controls.append(straight_step(plan_.states.back()));
@@ -93,7 +93,7 @@ class Run {
     ++replans_in_a_row_;
     const bool lost = plan_.cost >= setup_.objective.drop && setup_.objective.drop > 0;
     if (auto ok = plan(lost || must_clear_hand() ? back_off() : controls, replan_iterations_); !ok) return ok;
-    replan_iterations_ = plan_.grasped ? options_.few_iterations
+    replan_iterations_ = plan_.at_goal ? options_.few_iterations
                                        : std::min(2 * replan_iterations_, options_.few_iterations_max);
     return {};
   }
@@ -160,7 +160,7 @@ class Run {
     x_ = std::move(state_result).value();
     outcome_.observed.push_back(x_);
     in_hand_ = robot_result->object_in_hand.value_or(
-        physics_pool::grasped(setup_.geometry, x_, setup_.objective));
+        physics_pool::at_goal(setup_.geometry, x_, setup_.objective));
     outcome_.dropped.clear();
     for (const int i : physics_pool::dropped_objects(setup_.geometry, x_, setup_.objective.drop_height)) {
       outcome_.dropped.push_back(layout().objects[static_cast<std::size_t>(i)].name);
@@ -179,7 +179,7 @@ class Run {
     if (auto ok = move_fingers(hand::kStroke); !ok) return ok.error();
     plan_.controls = {};
     plan_.states = {x_};
-    plan_.grasped = false;
+    plan_.at_goal = false;
     return !outcome_.dropped.empty();
   }
 
@@ -190,8 +190,8 @@ class Run {
       outcome_.success = true;
       outcome_.reason = "target grasped";
     } else {
-      outcome_.success = plan_.grasped;
-      outcome_.reason = plan_.grasped ? "plan reaches the target; not executed"
+      outcome_.success = plan_.at_goal;
+      outcome_.reason = plan_.at_goal ? "plan reaches the target; not executed"
                                       : "plan does not reach the target; not executed";
     }
     return {};

@@ -56,7 +56,7 @@ void Search::adopt(const RolloutBatch& batch, const BatchReply& reply) {
   if (batch.fidelity == physics_pool::Fidelity{}) best_.controls.truncate(static_cast<int>(winner->steps));
   best_.states = winner->trajectory;
   best_.cost = winner->cost;
-  best_.grasped = winner->grasped && winner->cost <= pattern_.objective.success_cost;
+  best_.at_goal = winner->at_goal && winner->cost <= pattern_.objective.success_cost;
 }
 
 Result<void> Search::consider(const ControlSequence& controls) {
@@ -71,7 +71,7 @@ Result<void> Search::consider(const ControlSequence& controls) {
 Result<void> Search::attempt(const std::function<Result<void>()>& step) {
   Plan before = best_;
   if (auto ok = step(); !ok) return ok;
-  if (!best_.grasped || pattern_.fidelity == physics_pool::Fidelity{}) return {};
+  if (!best_.at_goal || pattern_.fidelity == physics_pool::Fidelity{}) return {};
   RolloutBatch full = around(best_.controls);
   std::ranges::fill(full.law.sigma, 0.0);
   full.fidelity = {};
@@ -92,7 +92,7 @@ Result<void> Search::attempt(const std::function<Result<void>()>& step) {
 Result<Plan> Search::until_done(const std::function<Result<void>()>& improve) {
   if (auto ok = attempt([this] { return consider(problem_.initial); }); !ok) return ok.error();
   report();
-  while (best_.iterations < problem_.iterations && !best_.grasped) {
+  while (best_.iterations < problem_.iterations && !best_.at_goal) {
     if (auto ok = attempt(improve); !ok) return ok.error();
     ++best_.iterations;
     report();
@@ -109,7 +109,7 @@ void Search::report() const {
   if (!on_progress_) return;
   on_progress_({.iteration = best_.iterations,
                 .cost = best_.cost,
-                .grasped = best_.grasped,
+                .at_goal = best_.at_goal,
                 .rollouts = best_.rollouts,
                 .final_state = best_.states.empty() ? nullptr : &best_.states.back()});
 }

@@ -159,7 +159,7 @@ bool succeeds(const Task& task, const Plan& plan, const planners::PbstoOptions& 
     }
   }
   const physics_pool::TaskGeometry& geometry = task.world->geometry();
-  return physics_pool::grasped(geometry, world.state(), options.objective) &&
+  return physics_pool::at_goal(geometry, world.state(), options.objective) &&
          physics_pool::count_dropped(geometry, world.state(), options.objective.drop_height) == 0;
 }
 
@@ -262,15 +262,15 @@ class Study {
       const Plan& plan = timed_result->plan;
       if (!first) first = *timed_result;
       LeverResult& result = results_.of(i, objects);
-      const bool executed = plan.grasped && succeeds(task, plan, lever);
+      const bool executed = plan.at_goal && succeeds(task, plan, lever);
       ++result.worlds;
-      result.planned += plan.grasped ? 1 : 0;
+      result.planned += plan.at_goal ? 1 : 0;
       result.executed += executed ? 1 : 0;
       result.denials += plan.denials;
       result.same_plans += plan.controls == first->plan.controls ? 1 : 0;
-      if (plan.grasped && first->plan.grasped) result.time_ratios.push_back(first->seconds / timed_result->seconds);
+      if (plan.at_goal && first->plan.at_goal) result.time_ratios.push_back(first->seconds / timed_result->seconds);
       line += fmt::format("  {} {} {:.1f} s", options_.levers[i].name,
-                          executed ? "grasps" : plan.grasped ? "misses" : "no plan", timed_result->seconds);
+                          executed ? "grasps" : plan.at_goal ? "misses" : "no plan", timed_result->seconds);
     }
     tell("{} objects, world {}:{}", objects, task.seed, line);
     return {};
@@ -286,7 +286,7 @@ class Study {
         if (!timed_result) return timed_result.error();
         demo_.push_back({.lever = lever.name,
                          .seed = task_result->seed,
-                         .planned = timed_result->plan.grasped,
+                         .planned = timed_result->plan.at_goal,
                          .seconds = timed_result->seconds});
       }
       tell("demo, seed {}", seed);

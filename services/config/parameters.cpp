@@ -11,13 +11,6 @@ namespace {
 using planners::ControlOptions;
 using planners::PbstoOptions;
 
-void read_axes(yaml::Fields& fields, const char* key, std::vector<double>& values) {
-  std::array<double, kGripperAxes> axes{};
-  std::copy_n(values.begin(), kGripperAxes, axes.begin());
-  fields.numbers(key, axes, false);
-  values.assign(axes.begin(), axes.end());
-}
-
 // `timeout` is checked before it becomes a duration, s.
 Parameters read(const YAML::Node& root, const std::string& origin, double& timeout) {
   Parameters parameters;
@@ -29,8 +22,8 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
   fields.optional("min_steps", planner.min_steps);
   fields.section("planner", false, [&](yaml::Fields& in) {
     in.optional("rollouts", planner.rollouts);
-    read_axes(in, "sigma", planner.sigma);
-    read_axes(in, "limit", planner.limit);
+    in.optional("sigma", planner.sigma);
+    in.optional("limit", planner.limit);
     in.optional("scales", planner.scales);
     in.choice<PbstoOptions::Update>("update", planner.update,
         {{"greedy", PbstoOptions::Update::kGreedy}, {"cost-weighted", PbstoOptions::Update::kCostWeighted}});
@@ -56,6 +49,10 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("drop", objective.drop);
     in.optional("drop_height", objective.drop_height);
     in.optional("obstruction", objective.obstruction);
+    in.optional("obstacle_target", objective.obstacle_target);
+    in.optional("obstacle_pusher", objective.obstacle_pusher);
+    in.optional("obstacle_nearest", objective.obstacle_nearest);
+    in.optional("intrusion", objective.intrusion);
     in.optional("success_cost", objective.success_cost);
   });
   fields.section("control", false, [&](yaml::Fields& in) {
@@ -102,6 +99,13 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
     if (range.value >= range.low && range.value <= range.high) continue;  // false for NaN
     return Error{Code::kInvalidArgument, fmt::format("{}: {}: got {}, wanted {} to {}", origin, range.key,
                                                      range.value, range.low, range.high)};
+  }
+  for (const auto& [key, values] : {std::pair{"sigma", &planner.sigma}, std::pair{"limit", &planner.limit}}) {
+    const std::size_t axes = values->size();
+    if (axes == planner.sigma.size() && (axes == kGripperAxes || axes == kPusherAxes)) continue;
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: planner.{}: got {} numbers, wanted {} for a gripper or {} for a pusher, of sigma "
+                             "and limit alike", origin, key, axes, int{kGripperAxes}, int{kPusherAxes})};
   }
   if (double(planner.rollouts) * planner.screening > physics_pool::kMaxSamples) {
     return Error{Code::kInvalidArgument,

@@ -4,8 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <optional>
 
 #include "physics_pool/scene/generate.hpp"
+#include "physics_pool/scene/generate_push.hpp"
 #include "physics_pool/scene/scene.hpp"
 #include "services/support/files.hpp"
 #include "services/support/program.hpp"
@@ -21,6 +23,9 @@ const std::string kStandardOutput = "-";
 struct Arguments {
   int chapter = 3;
   physics_pool::GenerateOptions generate;
+  physics_pool::GeneratePushOptions push;
+  std::optional<int> objects;  // 15 of Chapter 3, 3 of Chapter 7
+  std::string shape = "cylinder";
   std::string input, output = kStandardOutput;
   std::string uncertainty = "low";
   std::uint64_t seed = 1;
@@ -34,8 +39,24 @@ Result<void> write(const std::string& file, const std::string& text) {
   return write_text(file, text);
 }
 
+Result<Scene> make_scene(Arguments arguments) {
+  if (arguments.chapter == 3) {
+    arguments.generate.objects = arguments.objects.value_or(arguments.generate.objects);
+    return physics_pool::generate_chapter3(arguments.generate);
+  }
+  arguments.push.seed = arguments.generate.seed;
+  arguments.push.shape = arguments.shape == "box" ? physics_pool::Shape::kBox : physics_pool::Shape::kCylinder;
+  if (arguments.chapter == 6) {
+    if (arguments.objects.value_or(0) == 0) return physics_pool::generate_chapter6(arguments.push);
+    return Error{Code::kInvalidArgument,
+                 fmt::format("--objects: got {}, wanted 0 of Chapter 6, or --chapter 7", *arguments.objects)};
+  }
+  arguments.push.objects = arguments.objects.value_or(arguments.push.objects);
+  return physics_pool::generate_chapter7(arguments.push);
+}
+
 Result<void> generate(const Arguments& arguments) {
-  auto scene_result = physics_pool::generate_chapter3(arguments.generate);
+  auto scene_result = make_scene(arguments);
   if (!scene_result) return scene_result.error();
   return write(arguments.output, to_yaml(*scene_result));
 }
@@ -102,14 +123,18 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
     return added;
   };
   CLI::App* generates = command("generate", "make a random scene of the thesis", generate);
-  generates->add_option("--chapter", arguments.chapter, "whose scenes: 3, Sec. 3.3.1")
-      ->check(CLI::IsMember({3}))->capture_default_str();
+  generates->add_option("--chapter", arguments.chapter, "whose scenes: 3, Sec. 3.3.1, grasping; 6, Sec. 6.3.3, pushing round an obstacle; 7, "
+                                                         "Sec. 7.4, pushing among sliders")
+      ->check(CLI::IsMember({3, 6, 7}))->capture_default_str();
   generates->add_option("--seed", arguments.generate.seed, "equal seeds give equal scenes")
       ->capture_default_str();
-  generates->add_option("--objects", arguments.generate.objects, "objects beside the target, 0 to 40")
+  generates->add_option("--objects", arguments.objects, "objects beside the target: 0 to 40, default 15, of Chapter 3; 0 to 3, default 3, of Chapter 7");
+  generates->add_option("--table", arguments.generate.table, "side of the table of Chapter 3, m; 0: 0.6, larger for more than 15 objects")
       ->capture_default_str();
-  generates->add_option("--table", arguments.generate.table, "side of the table, m; 0: 0.6, larger for more than 15 objects")
-      ->capture_default_str();
+  generates->add_option("--shape", arguments.shape, "of the sliders of Chapters 6 and 7: cylinder or box")
+      ->check(CLI::IsMember({"cylinder", "box"}))->capture_default_str();
+  generates->add_option("--integrator", arguments.push.integrator, "of Chapters 6 and 7: euler, or rk4, the thesis's, at four times the work")
+      ->check(CLI::IsMember({"euler", "rk4"}))->capture_default_str();
   add_output(*generates, arguments);
 
   add_input(*command("check", "say ok and the scene's hash, or what is wrong", check), arguments);

@@ -24,11 +24,13 @@ std::vector<perception::ObjectReading> object_readings(const StateLayout& layout
 
 Result<robot_bridge::RobotReading> SimulatedRobot::read() {
   const State& x = world_.state();
-  const int joints = world_.world().geometry().layout.robot_joints();
+  const physics_pool::TaskGeometry& geometry = world_.world().geometry();
+  const int joints = geometry.layout.robot_joints();
   return robot_bridge::RobotReading{
       .q = {x.q.begin(), x.q.begin() + joints},
       .v = {x.v.begin(), x.v.begin() + joints},
-      .object_in_hand = physics_pool::grasped(world_.world().geometry(), x, {})};
+      .object_in_hand = geometry.task.is_push() ? std::nullopt
+                                                : std::optional(physics_pool::at_goal(geometry, x, {}))};
 }
 
 Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {

@@ -8,8 +8,10 @@
 #include <latch>
 
 #include "physics_pool/local/thread_pool.hpp"
+#include "physics_pool/parareal/parareal_pool.hpp"
 #include "services/pool_remote/remote_pool.hpp"
 #include "tests/support/batches.hpp"
+#include "tests/support/pushing.hpp"
 #include "tests/support/worker_process.hpp"
 
 namespace jostle::tests {
@@ -25,6 +27,7 @@ struct Implementation {
   const char* name;
   int threads;  // in this process, or
   int workers;  // processes over DDS
+  bool parareal = false;  // on top of them, with as many iterations as steps
 };
 
 // A pool and whatever it needs to be alive. One at a time: a process has one
@@ -32,34 +35,42 @@ struct Implementation {
 struct Rig {
   explicit Rig(const Implementation& implementation) {
     if (implementation.threads > 0) {
-      pool = std::make_unique<ThreadPool>(implementation.threads);
-      return;
+      engines = std::make_unique<ThreadPool>(implementation.threads);
+    } else {
+      find_workers(implementation);
     }
+    if (implementation.parareal) {
+      parareal = std::make_unique<PararealPool>(*engines, PararealOptions{.stop = {.iterations = INT_MAX}});
+    }
+  }
+
+  void find_workers(const Implementation& implementation) {
     for (int i = 0; i < implementation.workers; ++i) workers.emplace_back(test_domain());
     participant = dds::Participant::open({.domain = test_domain()}).value();
     auto remote = std::make_unique<services::RemotePool>(*participant);
     if (!remote->wait_for_workers(implementation.workers, in(kPatience))) {
       throw std::runtime_error("the workers were not found");
     }
-    pool = std::move(remote);
+    engines = std::move(remote);
   }
 
   std::vector<WorkerProcess> workers;
   std::optional<dds::Participant> participant;
-  std::unique_ptr<AsyncPool> pool;
+  std::unique_ptr<AsyncPool> engines;
+  std::unique_ptr<PararealPool> parareal;
 };
 
 // Starting workers takes longer than most tests, so consecutive tests of one
 // implementation share them.
 class PoolContract : public ::testing::TestWithParam<Implementation> {
  protected:
-  static AsyncPool& pool() {
+  static Rig& rig() {
     if (!rig_ || owner_ != GetParam().name) {
       rig_.reset();
       rig_ = std::make_unique<Rig>(GetParam());
       owner_ = GetParam().name;
     }
-    return *rig_->pool;
+    return *rig_;
   }
 
   PoolContract() { EXPECT_TRUE(sut.load(scene)); }
@@ -79,8 +90,16 @@ class PoolContract : public ::testing::TestWithParam<Implementation> {
     return one.run(batch, in(kPatience)).value();
   }
 
-  const Scene scene = small_scene();
-  AsyncPool& sut = pool();
+  // Coarse models know pushers only.
+  static Scene scene_of(std::uint64_t seed) {
+    if (!GetParam().parareal) return small_scene(seed);
+    const double y = 0.01 * static_cast<double>(seed);
+    return pushing_scene(-0.07, y, {slider_disc("target", 0.0, 0.0), slider_disc("other", 0.11, y)});
+  }
+
+  const Scene scene = scene_of(1);
+  AsyncPool& engines = *rig().engines;
+  Pool& sut = GetParam().parareal ? static_cast<Pool&>(*rig().parareal) : engines;
 
  private:
   friend class EndOfRig;
@@ -88,16 +107,30 @@ class PoolContract : public ::testing::TestWithParam<Implementation> {
   static inline std::string owner_;
 };
 
+// What Parareal does not promise: how much work it does, and batches left running.
+class EnginePoolContract : public PoolContract {};
+
 // Takes the last rig down before static destruction takes the middleware.
 class EndOfRig : public ::testing::Environment {
   void TearDown() override { PoolContract::rig_.reset(); }
 };
 const auto* const kEndOfRig = ::testing::AddGlobalTestEnvironment(new EndOfRig);
 
-// The hand around the target: noise decides which samples keep it there.
-RolloutBatch grasping_batch(const Scene& scene) {
+// One step before the goal: noise decides which samples reach it, and stay there.
+RolloutBatch almost_there(const Scene& scene) {
   RolloutBatch batch = push_batch(scene, 12);
   const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
+  if (scene.task.is_push()) {
+    batch.x0.q[2] = scene.task.goal.x - scene.task.goal.radius - 0.01;  // 1 cm short of the region
+    batch.x0.q[3] = scene.task.goal.y;
+    batch.x0.q[kJointX] = batch.x0.q[2] - target.radius - scene.robot.radius - 0.001;
+    batch.x0.q[kJointY] = batch.x0.q[3];
+    batch.nominal.truncate(1);
+    batch.nominal.step(0)[kControlX] = 0.03;
+    batch.objective.success_cost = 1e9;
+    batch.stop_on_success = true;
+    return batch;
+  }
   batch.x0.q[kJointX] = target.x - 0.070;  // 10 mm short of the pre-grasp region
   batch.x0.q[kJointY] = target.y;
   batch.nominal.truncate(1);
@@ -139,7 +172,7 @@ TEST_P(PoolContract, WinnerBeatsTheIncumbentOrThereIsNone) {
 }
 
 TEST_P(PoolContract, LowestSuccessfulSampleWins) {
-  const RolloutBatch batch = grasping_batch(scene);
+  const RolloutBatch batch = almost_there(scene);
   // One sample at a time: no sibling can interfere.
   int lowest = -1;
   for (std::uint32_t sample = 0; sample < batch.samples && lowest < 0; ++sample) {
@@ -171,7 +204,7 @@ TEST_P(PoolContract, SamplesAreNamedFromTheFirstOneAsked) {
   EXPECT_EQ(some.outcomes[1].cost, all.outcomes[4].cost);
 }
 
-TEST_P(PoolContract, ReducedPhysicsGivesTheSameBitsEverywhere) {
+TEST_P(EnginePoolContract, ReducedPhysicsGivesTheSameBitsEverywhere) {
   for (const Fidelity& fidelity : {Fidelity{.freeze = true}, Fidelity{.freeze = true, .time_step = 0.01}}) {
     RolloutBatch batch = push_batch(scene, 6);
     const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
@@ -194,7 +227,7 @@ TEST_P(PoolContract, ReducedPhysicsGivesTheSameBitsEverywhere) {
   }
 }
 
-TEST_P(PoolContract, StoppingTheHopelessNeverChangesTheWinner) {
+TEST_P(EnginePoolContract, StoppingTheHopelessNeverChangesTheWinner) {
   RolloutBatch batch = push_batch(scene, 16);
   std::ranges::fill(batch.nominal.values, 0.0);
   batch.law.sigma.assign(batch.nominal.values.size(), 0.0);  // one step there or away, then rest
@@ -321,7 +354,7 @@ TEST_P(PoolContract, ManySmallBatchesEndInTime) {
 }
 
 TEST_P(PoolContract, TwoThreadsMayRunAtOnce) {
-  const Scene other = small_scene(2);
+  const Scene other = scene_of(2);
   ASSERT_TRUE(sut.load(other));
   RolloutBatch here = push_batch(scene, 4), there = push_batch(other, 4);
   here.stop_losers = there.stop_losers = false;
@@ -335,7 +368,7 @@ TEST_P(PoolContract, TwoThreadsMayRunAtOnce) {
   EXPECT_EQ(fingerprints(*theirs), fingerprints(run(there)));
 }
 
-TEST_P(PoolContract, ManySubmittedBatchesReplyOnceEach) {
+TEST_P(EnginePoolContract, ManySubmittedBatchesReplyOnceEach) {
   constexpr std::size_t kBatches = 40;
   std::mutex mutex;  // guards replies
   std::condition_variable arrived;
@@ -346,7 +379,7 @@ TEST_P(PoolContract, ManySubmittedBatchesReplyOnceEach) {
   std::vector<std::unique_ptr<AsyncPool::Ticket>> tickets;
   for (std::uint32_t i = 0; i < kBatches; ++i) {
     batch.first_sample = i;
-    auto ticket_result = sut.submit(batch, [&, i](Result<BatchReply> reply_result) {
+    auto ticket_result = engines.submit(batch, [&, i](Result<BatchReply> reply_result) {
       const std::lock_guard lock(mutex);
       if (reply_result) replies[i] = fingerprints(*reply_result);
       ++count;
@@ -370,9 +403,9 @@ TEST_P(PoolContract, ManySubmittedBatchesReplyOnceEach) {
   EXPECT_EQ(apart, together);
 }
 
-TEST_P(PoolContract, TicketThatGoesCancelsItsBatch) {
+TEST_P(EnginePoolContract, TicketThatGoesCancelsItsBatch) {
   std::atomic<int> calls = 0;
-  auto ticket_result = sut.submit(wait_batch(scene, 8, 10s), [&](Result<BatchReply>) { ++calls; });
+  auto ticket_result = engines.submit(wait_batch(scene, 8, 10s), [&](Result<BatchReply>) { ++calls; });
   ASSERT_TRUE(ticket_result);
   EXPECT_EQ((*ticket_result)->missing(), 8u);
 
@@ -384,14 +417,21 @@ TEST_P(PoolContract, TicketThatGoesCancelsItsBatch) {
   EXPECT_EQ(calls, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Threads, PoolContract,
-                         ::testing::Values(Implementation{"one_thread", 1, 0},
-                                           Implementation{"two_threads", 2, 0}),
-                         [](const auto& test) { return test.param.name; });
-INSTANTIATE_TEST_SUITE_P(OneWorker, PoolContract, ::testing::Values(Implementation{"one_worker", 0, 1}),
-                         [](const auto& test) { return test.param.name; });
-INSTANTIATE_TEST_SUITE_P(TwoWorkers, PoolContract, ::testing::Values(Implementation{"two_workers", 0, 2}),
-                         [](const auto& test) { return test.param.name; });
+const auto kName = [](const auto& test) { return std::string(test.param.name); };
+const auto kThreads = ::testing::Values(Implementation{"one_thread", 1, 0}, Implementation{"two_threads", 2, 0});
+const auto kOneWorker = ::testing::Values(Implementation{"one_worker", 0, 1});
+const auto kTwoWorkers = ::testing::Values(Implementation{"two_workers", 0, 2});
+
+INSTANTIATE_TEST_SUITE_P(Threads, PoolContract, kThreads, kName);
+INSTANTIATE_TEST_SUITE_P(Threads, EnginePoolContract, kThreads, kName);
+INSTANTIATE_TEST_SUITE_P(OneWorker, PoolContract, kOneWorker, kName);
+INSTANTIATE_TEST_SUITE_P(OneWorker, EnginePoolContract, kOneWorker, kName);
+INSTANTIATE_TEST_SUITE_P(TwoWorkers, PoolContract, kTwoWorkers, kName);
+INSTANTIATE_TEST_SUITE_P(TwoWorkers, EnginePoolContract, kTwoWorkers, kName);
+INSTANTIATE_TEST_SUITE_P(PararealOnThreads, PoolContract,
+                         ::testing::Values(Implementation{"parareal_two_threads", 2, 0, true}), kName);
+INSTANTIATE_TEST_SUITE_P(PararealOnWorkers, PoolContract,
+                         ::testing::Values(Implementation{"parareal_two_workers", 0, 2, true}), kName);
 
 }  // namespace
 }  // namespace jostle::tests

@@ -24,10 +24,13 @@ inline physics_pool::RolloutBatch push_batch(const physics_pool::Scene& scene, s
   physics_pool::RolloutBatch batch;
   batch.world = physics_pool::scene_hash(scene);
   batch.x0 = physics_pool::initial_state(scene);
-  for (int t = 0; t < 3; ++t) batch.nominal.append(std::vector{0.1, 0.0, 0.0, 0.0});
-  batch.u_before.assign(4, 0.0);
+  const auto nu = static_cast<std::size_t>(physics_pool::layout_of(scene).nu);
+  const auto axes = [nu](std::vector<double> values) { values.resize(nu); return values; };  // a pusher has two
+  batch.nominal.nu = static_cast<int>(nu);
+  for (int t = 0; t < 3; ++t) batch.nominal.append(axes({0.1, 0.0, 0.0, 0.0}));
+  batch.u_before.assign(nu, 0.0);
   batch.step_duration = 0.2;
-  batch.law = {.sigma = {0.04, 0.04, 0.25, 0.01}, .limit = {0.15, 0.15, 0.8, 0.05}, .seed = 42};
+  batch.law = {.sigma = axes({0.04, 0.04, 0.25, 0.01}), .limit = axes({0.15, 0.15, 0.8, 0.05}), .seed = 42};
   batch.samples = samples;
   return batch;
 }
@@ -43,7 +46,7 @@ inline physics_pool::RolloutBatch wait_batch(const physics_pool::Scene& scene, s
 /// The bits of an outcome that must not depend on who ran it.
 inline Hash fingerprint(const physics_pool::RolloutOutcome& outcome) {
   std::vector<double> all{static_cast<double>(outcome.sample), static_cast<double>(outcome.end),
-                          outcome.cost, static_cast<double>(outcome.grasped)};
+                          outcome.cost, static_cast<double>(outcome.at_goal)};
   all.insert(all.end(), outcome.step_costs.begin(), outcome.step_costs.end());
   for (const State& x : outcome.trajectory) {
     all.insert(all.end(), x.q.begin(), x.q.end());

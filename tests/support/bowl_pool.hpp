@@ -87,7 +87,7 @@ class BowlPool final : public physics_pool::Pool {
     }
     if (can_succeed && batch.stop_on_success && outcome.cost <= batch.objective.success_cost) {
       outcome.end = End::kSucceeded;
-      outcome.grasped = true;
+      outcome.at_goal = true;
       if (success_steps) {
         outcome.steps = static_cast<std::uint32_t>(*success_steps);
         outcome.step_costs.resize(outcome.steps);

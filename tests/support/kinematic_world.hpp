@@ -98,7 +98,7 @@ class KinematicPlanner final : public planners::Planner {
       plan.states.push_back(moved(plan.states.back(), plan.controls.step(t), step_duration));
     }
     plan.cost = 1.0;
-    plan.grasped = predicts_grasp;
+    plan.at_goal = predicts_grasp;
     plan.iterations = problem.iterations;
     plan.rollouts = 10;
     if (change) change(plan, static_cast<int>(problems.size()));

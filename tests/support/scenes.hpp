@@ -49,4 +49,37 @@ inline physics_pool::Scene three_objects() {
   return scene;
 }
 
+/// The slider of Sec. 6.3, its centre at (x, y).
+inline physics_pool::SceneObject slider(std::string name, double x, double y) {
+  return {.name = std::move(name),
+          .shape = physics_pool::Shape::kCylinder,
+          .radius = 0.05115,
+          .height = 0.0245,
+          .mass = 0.5,
+          .friction = 0.2,
+          .x = x,
+          .y = y};
+}
+
+/// A pusher 1 cm behind the target, the goal region ahead; no obstacle.
+inline physics_pool::Scene push_ahead() {
+  physics_pool::Scene scene;
+  scene.name = "push ahead";
+  scene.surface.size = {1.0, 0.8};
+  scene.objects = {slider("target", -0.2, 0.0)};
+  scene.robot = {.model = "pusher", .x = -0.2 - 0.05115 - 0.0145 - 0.01, .y = 0.0};
+  scene.task = {.kind = "push", .target = "target", .goal = {.x = 0.2, .y = 0.0, .radius = 0.04}};
+  scene.physics.time_step = 0.001;
+  return scene;
+}
+
+/// The same with an obstacle halfway and another slider beside the way.
+inline physics_pool::Scene push_around() {
+  physics_pool::Scene scene = push_ahead();
+  scene.name = "push around";
+  scene.objects.push_back(slider("other", 0.0, 0.25));
+  scene.task.obstacle = physics_pool::Disc{.x = 0.0, .y = 0.0, .radius = 0.04};
+  return scene;
+}
+
 }  // namespace jostle::tests

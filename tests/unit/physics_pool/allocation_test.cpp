@@ -110,7 +110,7 @@ TEST_F(AllocationTest, ScoringAStepAllocatesNothing) {
   const Objective objective;
   const long before = allocations;
   const double cost = running_cost(geometry, objective, none, u, a, b) +
-                      goal_cost(geometry, b, objective.angle) + grasped(geometry, b, objective);
+                      goal_cost(geometry, b, objective.angle) + at_goal(geometry, b, objective);
   EXPECT_EQ(allocations, before);
   EXPECT_GT(cost, 0.0);
 }

@@ -131,6 +131,11 @@ const std::vector<Case> kCases{
     {"NaNScale", [](B& b) { b.law.scales = {1, kNaN}; }, "law.scales[1]", "nan", ">= 0"},
     {"InfiniteSigma", [](B& b) { b.law.sigma[0] = HUGE_VAL; }, "law.sigma[0]", "inf", ">= 0"},
     {"NegativeObstruction", [](B& b) { b.objective.obstruction = -1; }, "objective.obstruction", "-1", ">= 0"},
+    {"NegativeObstacleTarget", [](B& b) { b.objective.obstacle_target = -1; }, "objective.obstacle_target", "-1", ">= 0"},
+    {"NaNObstaclePusher", [](B& b) { b.objective.obstacle_pusher = kNaN; }, "objective.obstacle_pusher", "nan", ">= 0"},
+    {"NoObstacleCap", [](B& b) { b.objective.obstacle_nearest = 0; }, "objective.obstacle_nearest", "0 m", ">= 0.001 m"},
+    {"NaNObstacleCap", [](B& b) { b.objective.obstacle_nearest = kNaN; }, "objective.obstacle_nearest", "nan", ">= 0.001 m"},
+    {"NegativeIntrusion", [](B& b) { b.objective.intrusion = -1; }, "objective.intrusion", "-1", ">= 0"},
     {"NaNSuccess", [](B& b) { b.objective.success_cost = kNaN; }, "objective.success_cost", "nan", ">= 0"},
 };
 

@@ -36,7 +36,7 @@ class OutlookTest : public testing::Test {
 TEST_F(OutlookTest, StandingStillPaysForTheWholeDistance) {
   const Outlook sut = of(constant(kNone, 3));
   EXPECT_NEAR(sut.cost, objective.goal * 0.325 * 0.325, 1e-9);  // 5 mm of slack
-  EXPECT_FALSE(sut.may_grasp);
+  EXPECT_FALSE(sut.may_succeed);
 }
 
 TEST_F(OutlookTest, TwoMetresPerMetreOfTheHandAtMost) {
@@ -48,7 +48,7 @@ TEST_F(OutlookTest, TwoMetresPerMetreOfTheHandAtMost) {
 TEST_F(OutlookTest, NothingIsCertainOfAHandThatCanArrive) {
   const Outlook sut = of(constant({0.1, 0.0, 0.0, 0.0}, 6), 1);
   EXPECT_EQ(sut.cost, 0.0);
-  EXPECT_TRUE(sut.may_grasp);
+  EXPECT_TRUE(sut.may_succeed);
 }
 
 TEST_F(OutlookTest, WhatHasDroppedIsPaidForInEveryStepToCome) {
@@ -84,11 +84,11 @@ TEST(OutlookOfRollouts, IsNeverTooHigh) {
         const auto before = done == 0 ? std::span<const double>(batch.u_before) : std::as_const(controls).step(done - 1);
         const Outlook sut = outlook(geometry, batch.objective, controls, done, before, outcome.trajectory[at], 1.0);
         EXPECT_LE(paid + sut.cost, outcome.cost * (1 + 1e-12)) << "seed " << seed << " sample " << sample;
-        for (std::size_t t = at + 1; t < outcome.trajectory.size() && !sut.may_grasp; ++t) {
-          EXPECT_FALSE(grasped(geometry, outcome.trajectory[t], batch.objective));
+        for (std::size_t t = at + 1; t < outcome.trajectory.size() && !sut.may_succeed; ++t) {
+          EXPECT_FALSE(at_goal(geometry, outcome.trajectory[t], batch.objective));
         }
         ++judged;
-        hopeless += sut.may_grasp ? 0 : 1;
+        hopeless += sut.may_succeed ? 0 : 1;
         paid += outcome.step_costs[at];
       }
     }

@@ -212,7 +212,7 @@ class Grasped : public ObjectiveTerms {
   bool at(double forward, double left, double rotation = 0.0) {
     place_hand(start, 0.03, -0.02, rotation);
     place_in_hand(start, forward, left);
-    return grasped(geometry, start, objective);
+    return at_goal(geometry, start, objective);
   }
   static constexpr double kEps = 1e-9;
   static constexpr double kMiddle = (hand::kGraspNear + hand::kGraspFar) / 2;
@@ -254,7 +254,7 @@ TEST_F(Grasped, DoesNotCareForOtherObjects) {
   place(start, 0, 1, 1);
   place_hand(start, 0, 0, 0);
   place(start, 1, kMiddle, 0);
-  EXPECT_FALSE(grasped(geometry, start, objective));
+  EXPECT_FALSE(at_goal(geometry, start, objective));
 }
 
 TEST_F(ObjectiveTerms, ObstructionsAreOtherObjectsBetweenTheFingers) {

@@ -132,8 +132,8 @@ TEST_F(RolloutTest, SucceedsWhenTheTargetIsInTheHandAndTellsItsSiblings) {
   const RolloutOutcome outcome = run_rollout(*sut, batch, 7, signals);
   ASSERT_EQ(outcome.end, End::kSucceeded);
   EXPECT_LT(outcome.steps, 8u);
-  EXPECT_TRUE(outcome.grasped);
-  EXPECT_TRUE(grasped(world->geometry(), outcome.trajectory.back(), batch.objective));
+  EXPECT_TRUE(outcome.at_goal);
+  EXPECT_TRUE(at_goal(world->geometry(), outcome.trajectory.back(), batch.objective));
   EXPECT_EQ(outcome.trajectory.size(), outcome.steps + 1u);
   EXPECT_NEAR(outcome.cost, std::accumulate(outcome.step_costs.begin(), outcome.step_costs.end(), 0.0), 1e-9 * outcome.cost);
   EXPECT_TRUE(signals.is_obsolete(8));

@@ -104,18 +104,18 @@ TEST_P(PbstoUpdate, StopsAtSuccess) {
   pool.can_succeed = true;
   options.objective.success_cost = 0.5 * pool.cost(problem(1).initial);
   const Plan plan = planned(problem(1000));
-  EXPECT_TRUE(plan.grasped);
+  EXPECT_TRUE(plan.at_goal);
   EXPECT_LE(plan.cost, options.objective.success_cost);
   EXPECT_LT(plan.iterations, 1000);
   // Every batch but the last was no success.
-  for (std::size_t i = 0; i + 1 < news.size(); ++i) EXPECT_FALSE(news[i].grasped);
+  for (std::size_t i = 0; i + 1 < news.size(); ++i) EXPECT_FALSE(news[i].at_goal);
 }
 
 TEST_P(PbstoUpdate, PlansNothingMoreWhenTheInitialControlsSucceed) {
   pool.can_succeed = true;
   options.objective.success_cost = 1e9;
   const Plan plan = planned(problem(50));
-  EXPECT_TRUE(plan.grasped);
+  EXPECT_TRUE(plan.at_goal);
   EXPECT_EQ(plan.iterations, 0);
   EXPECT_EQ(plan.controls, problem(50).initial);
   EXPECT_EQ(pool.batches.size(), 1u);
@@ -406,7 +406,7 @@ TEST_F(PbstoTest, SuccessOfReducedPhysicsCountsOnceFullPhysicsAgrees) {
   options.freeze = true;
   options.objective.success_cost = 0.5 * pool.cost(problem(1).initial);
   const Plan plan = planned(problem(50));
-  EXPECT_TRUE(plan.grasped);
+  EXPECT_TRUE(plan.at_goal);
   EXPECT_TRUE(is_full(pool.batches.back()));
   EXPECT_EQ(pool.batches.back().samples, 1u);
   EXPECT_EQ(std::ranges::count_if(pool.batches, is_full), 1);
@@ -420,7 +420,7 @@ TEST_F(PbstoTest, SuccessThatFullPhysicsDeniesIsOneMoreCandidate) {
   options.objective.success_cost = 0.5 * start;
   pool.extra = [=](const auto& batch) { return is_full(batch) ? 10 * start : 0.0; };
   const Plan plan = planned(problem(10));
-  EXPECT_FALSE(plan.grasped);
+  EXPECT_FALSE(plan.at_goal);
   EXPECT_EQ(plan.iterations, 10);
   EXPECT_LT(plan.cost, 10 * start);  // the denied ones were not kept
   EXPECT_GT(std::ranges::count_if(pool.batches, is_full), 1);
@@ -438,7 +438,7 @@ TEST_F(PbstoTest, DeniedSuccessDoesNotShortenTheHorizon) {
   const Plan plan = planned(problem(3));
   EXPECT_GT(plan.denials, 0);
   for (const auto& batch : pool.batches) EXPECT_EQ(batch.nominal.steps(), 3);
-  if (!plan.grasped) {
+  if (!plan.at_goal) {
     EXPECT_EQ(plan.controls.steps(), 3);
   }
 }
@@ -452,7 +452,7 @@ TEST_F(PbstoTest, DeniedSuccessThatIsStillBetterIsKeptAtItsTrueCost) {
   planned(problem(12));
   bool kept = false;
   for (std::size_t i = 1; i < news.size(); ++i) {
-    kept = kept || (!news[i].grasped && news[i].cost > options.objective.success_cost && news[i].cost < news[i - 1].cost);
+    kept = kept || (!news[i].at_goal && news[i].cost > options.objective.success_cost && news[i].cost < news[i - 1].cost);
   }
   EXPECT_TRUE(kept);
 }

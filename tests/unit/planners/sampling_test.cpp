@@ -163,10 +163,10 @@ TEST_P(SamplingMethod, StopsAtSuccess) {
   pool.can_succeed = true;
   options.objective.success_cost = 0.5 * pool.cost(problem(1).initial);
   const Plan plan = planned(problem(1000));
-  EXPECT_TRUE(plan.grasped);
+  EXPECT_TRUE(plan.at_goal);
   EXPECT_LE(plan.cost, options.objective.success_cost);
   EXPECT_LT(plan.iterations, 1000);
-  for (std::size_t i = 0; i + 1 < news.size(); ++i) EXPECT_FALSE(news[i].grasped);
+  for (std::size_t i = 0; i + 1 < news.size(); ++i) EXPECT_FALSE(news[i].at_goal);
 }
 
 TEST_P(SamplingMethod, PassesErrorsOfThePoolOn) {

@@ -33,7 +33,8 @@ RolloutBatch odd_batch() {
   batch.objective = {.goal = 1, .angle = 2, .acceleration = 3, .disturbance = 4,
                      .disturbance_rotation = 5, .edge = 6, .edge_rate = 7, .edge_exponent_max = 8,
                      .edge_margin = 9, .topple = 10, .topple_angle = 11, .drop = 12,
-                     .drop_height = 13, .obstruction = 15, .success_cost = 14};
+                     .drop_height = 13, .obstruction = 15, .obstacle_target = 16, .obstacle_pusher = 17, .obstacle_nearest = 18,
+                     .intrusion = 19, .success_cost = 14};
   batch.incumbent = 0.1;
   batch.stop_losers = false;
   batch.stop_hopeless = true;
@@ -89,7 +90,7 @@ RolloutOutcome odd_outcome() {
           .steps = 2,
           .engine_steps = std::uint64_t{1} << 40,
           .thawed = 3,
-          .grasped = true,
+          .at_goal = true,
           .step_costs = {0.1, -0.0},
           .trajectory = {{.q = {1, 2, 3}, .v = {4}}, {.q = {5, 6, -0.0}, .v = {kInfinity}}},
           .reason = "a reason"};
@@ -106,7 +107,7 @@ TEST(ConvertOutcome, SurvivesTheWire) {
   EXPECT_EQ(got_result->steps, wanted.steps);
   EXPECT_EQ(got_result->engine_steps, wanted.engine_steps);
   EXPECT_EQ(got_result->thawed, wanted.thawed);
-  EXPECT_EQ(got_result->grasped, wanted.grasped);
+  EXPECT_EQ(got_result->at_goal, wanted.at_goal);
   EXPECT_EQ(hash_of(got_result->step_costs), hash_of(wanted.step_costs));
   EXPECT_EQ(got_result->trajectory, wanted.trajectory);
   EXPECT_EQ(got_result->reason, wanted.reason);

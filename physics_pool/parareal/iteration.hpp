@@ -57,8 +57,9 @@ class PararealIteration {
 
   bool done() const { return final_level_.has_value(); }
   int iterations() const { return *final_level_; }  ///< k of states(); once done
-  /// x_0 … x_N; once done.
-  const std::vector<State>& states() const { return levels_[static_cast<std::size_t>(*final_level_)].states; }
+  /// x_0 … x_N after the last iteration, once done; or after k of them.
+  const std::vector<State>& states() const { return states(*final_level_); }
+  const std::vector<State>& states(int k) const { return levels_[static_cast<std::size_t>(k)].states; }
 
   /// Empty, or which prediction of the coarse model is of no use.
   const std::string& problem() const { return problem_; }

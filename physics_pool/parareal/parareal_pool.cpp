@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "physics_pool/objective/tally.hpp"
+#include "physics_pool/parareal/levels.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -22,21 +23,6 @@ int workers_of(const Pool& pool) {
   int workers = 0;
   for (const WorkerStatus& worker : pool.status().workers) workers += worker.alive ? worker.capacity : 0;
   return std::max(workers, 1);
-}
-
-// F(start, u) as a batch of one rollout of one step.
-RolloutBatch slice_batch(const RolloutBatch& of, const State& start, std::span<const double> u) {
-  const std::size_t nu = u.size();
-  return {.world = of.world,
-          .x0 = start,
-          .nominal = {.nu = static_cast<int>(nu), .values = {u.begin(), u.end()}},
-          .u_before = std::vector<double>(nu, 0.0),
-          .step_duration = of.step_duration,
-          .law = {.sigma = std::vector<double>(nu, 0.0), .limit = std::vector<double>(nu, kInfinity)},
-          .objective = of.objective,
-          .stop_losers = false,
-          .want_all_trajectories = true,
-          .fidelity = of.fidelity};
 }
 
 }  // namespace

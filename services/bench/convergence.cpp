@@ -13,7 +13,7 @@
 #include "planners/control/controller.hpp"
 #include "planners/pbsto/pbsto.hpp"
 #include "planners/sampling/sampling.hpp"
-#include "services/bench/plot.hpp"
+#include "services/support/plot.hpp"
 #include "services/support/statistics.hpp"
 
 namespace jostle::services {

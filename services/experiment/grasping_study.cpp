@@ -3,12 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <mutex>
-#include <nlohmann/json.hpp>
-#include <thread>
+#include <tuple>
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/scene/yaml_fields.hpp"
@@ -21,9 +19,8 @@ namespace {
 using physics_pool::Scene;
 using physics_pool::Uncertainty;
 
-GraspingStudy read(const YAML::Node& root, const std::string& origin, std::string& parameters) {
+GraspingStudy read(yaml::Fields& fields, std::string& parameters) {
   GraspingStudy study;
-  yaml::Fields fields(root, "", origin);
   fields.required("title", study.title);
   fields.required("parameters", parameters);
   fields.optional("objects", study.objects);
@@ -34,7 +31,6 @@ GraspingStudy read(const YAML::Node& root, const std::string& origin, std::strin
   fields.optional("levels", study.levels);
   fields.optional("controllers", study.controllers);
   fields.optional("thesis", study.thesis);
-  fields.finish();
   return study;
 }
 
@@ -48,7 +44,8 @@ double execution_cost(const physics_pool::TaskGeometry& geometry,
   return sum;
 }
 
-Result<planners::Outcome> grasp(const GraspingStudy& study, const GraspingRun& run, double& cost) {
+Result<planners::Outcome> grasp(const GraspingStudy& study, const GraspingRun& run, double& cost,
+                                std::stop_token stop) {
   const Uncertainty level = *physics_pool::parse_uncertainty(run.level);
   auto scene_result = physics_pool::generate_chapter3({.objects = study.objects, .seed = run.seed});
   if (!scene_result) return scene_result.error();
@@ -80,26 +77,18 @@ Result<planners::Outcome> grasp(const GraspingStudy& study, const GraspingRun& r
   planners::ControlOptions options = study.parameters.control;
   options.method = run.controller == "or" ? planners::ControlOptions::Method::kOnline
                                           : planners::ControlOptions::Method::kNaive;
-  auto outcome_result = planners::run_controller(setup, options);
+  auto outcome_result = planners::run_controller(setup, options, {}, stop);
   if (outcome_result) {
     cost = execution_cost(believed->geometry(), setup.objective, outcome_result->observed);
   }
   return outcome_result;
 }
 
-struct Mean {
-  double value = 0.0, half_width = 0.0;  // 95 % interval, normal approximation
-};
-
 template <class Value>
-Mean mean_of(const std::vector<const GraspingRun*>& runs, Value value) {
-  if (runs.empty()) return {};
-  const double n = static_cast<double>(runs.size());
-  double sum = 0.0, squares = 0.0;
-  for (const GraspingRun* run : runs) sum += value(*run);
-  for (const GraspingRun* run : runs) squares += std::pow(value(*run) - sum / n, 2);
-  const double deviation = n > 1 ? std::sqrt(squares / (n - 1)) : 0.0;
-  return {.value = sum / n, .half_width = 1.96 * deviation / std::sqrt(n)};
+Mean mean_over(const std::vector<const GraspingRun*>& runs, Value value) {
+  std::vector<double> values;
+  for (const GraspingRun* run : runs) values.push_back(value(*run));
+  return mean_of(values);
 }
 
 // Runs of one level and one controller.
@@ -133,35 +122,68 @@ Share share_of(const Cell& cell) {
   return wilson_interval(static_cast<int>(cell.successes.size()), static_cast<int>(cell.runs.size()));
 }
 
-}  // namespace
-
-Result<GraspingStudy> load_grasping_study(const std::string& name) {
-  const auto file = data_file("experiments/" + name + ".yaml");
-  auto text_result = read_text(file);
-  if (!text_result) {
-    return Error{Code::kNotFound, fmt::format("experiment: got '{}', wanted one of `jostle experiment "
-                                              "list` ({})", name, text_result.error().message)};
+// Levels and controllers that exist; `where` they were asked for.
+Result<void> check(const GraspingStudy& study, const std::string& where) {
+  for (const std::string& level : study.levels) {
+    if (auto ok = physics_pool::parse_uncertainty(level); !ok) {
+      return Error{Code::kInvalidArgument, fmt::format("{}levels: {}", where, ok.error().message)};
+    }
   }
-  return yaml::parse<GraspingStudy>(*text_result, file.string(), [&](const YAML::Node& root) -> Result<GraspingStudy> {
-    std::string parameters_file;
-    GraspingStudy study = read(root, file.string(), parameters_file);
-    auto parameters_result = load_parameters(file.parent_path() / parameters_file);
-    if (!parameters_result) return parameters_result.error();
-    study.parameters = *parameters_result;
-    for (const std::string& level : study.levels) {
-      if (auto ok = physics_pool::parse_uncertainty(level); !ok) return ok.error();
-    }
-    for (const std::string& controller : study.controllers) {
-      if (controller != "or" && controller != "nr") {
-        return Error{Code::kInvalidArgument,
-                     fmt::format("{}: controllers: got '{}', wanted or, nr", file.string(), controller)};
-      }
-    }
-    return study;
-  });
+  for (const std::string& controller : study.controllers) {
+    if (controller == "or" || controller == "nr") continue;
+    return Error{Code::kInvalidArgument, fmt::format("{}controllers: got '{}', wanted or, nr", where, controller)};
+  }
+  return {};
 }
 
-std::vector<GraspingRun> run_study(const GraspingStudy& study, int jobs,
+class GraspingStudyRunner final : public Study {
+ public:
+  explicit GraspingStudyRunner(GraspingStudy study) : study_(std::move(study)) {}
+
+  const std::string& title() const override { return study_.title; }
+
+  Result<StudyReport> run(const StudyOptions& options) override {
+    if (!options.models.empty() || options.samples) {
+      return Error{Code::kInvalidArgument, "this study has no --models and no --samples, wanted --seeds, --levels, "
+                                           "--controllers, --timeout"};
+    }
+    GraspingStudy study = study_;
+    if (options.seeds) std::tie(study.first_seed, study.last_seed) = *options.seeds;
+    if (!options.levels.empty()) study.levels = options.levels;
+    if (!options.controllers.empty()) study.controllers = options.controllers;
+    if (options.timeout) study.parameters.control.timeout = *options.timeout;
+    if (auto ok = check(study, "--"); !ok) return ok.error();
+    const auto total = study.levels.size() * study.controllers.size() * (study.last_seed - study.first_seed + 1);
+    std::size_t done = 0;
+    bool broken = false;
+    const auto runs = run_study(study, options, [&](const GraspingRun& run) {
+      broken = broken || !run.error.empty();
+      options.on_progress(fmt::format("[{:>3}/{}] {:<7} {} seed {:<4} {:<7} {} ({:.0f} s, {} re-plans)", ++done, total,
+                                      run.level, run.controller, run.seed, run.outcome.success ? "ok" : "FAILED",
+                                      run.error.empty() ? run.outcome.reason : run.error,
+                                      run.outcome.total_time.count(), run.outcome.replans));
+    });
+    if (options.stop.stop_requested()) return Error{Code::kCancelled, "experiment: stopped on request"};
+    return StudyReport{.table = study_table(study, runs), .json = study_json(study, runs), .broken = broken};
+  }
+
+ private:
+  GraspingStudy study_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Study>> read_grasping_study(yaml::Fields& fields, const std::string& origin) {
+  std::string parameters;
+  GraspingStudy study = read(fields, parameters);
+  auto parameters_result = load_parameters(std::filesystem::path(origin).parent_path() / parameters);
+  if (!parameters_result) return parameters_result.error();
+  study.parameters = *parameters_result;
+  if (auto ok = check(study, origin + ": "); !ok) return ok.error();
+  return std::unique_ptr<Study>(std::make_unique<GraspingStudyRunner>(std::move(study)));
+}
+
+std::vector<GraspingRun> run_study(const GraspingStudy& study, const StudyOptions& options,
                                    const std::function<void(const GraspingRun&)>& on_run) {
   std::vector<GraspingRun> runs;
   for (const std::string& level : study.levels) {
@@ -171,24 +193,18 @@ std::vector<GraspingRun> run_study(const GraspingStudy& study, int jobs,
       }
     }
   }
-  std::atomic<std::size_t> next = 0;
   std::mutex reporting;
-  const auto work = [&] {
-    for (std::size_t i = next++; i < runs.size(); i = next++) {
-      GraspingRun& run = runs[i];
-      auto outcome_result = grasp(study, run, run.execution_cost);
-      if (outcome_result) {
-        run.outcome = std::move(outcome_result).value();
-      } else {
-        run.error = outcome_result.error().message;
-      }
-      const std::lock_guard lock(reporting);
-      if (on_run) on_run(run);
+  run_side_by_side(runs.size(), options.jobs, options.stop, [&](std::size_t i) {
+    GraspingRun& run = runs[i];
+    auto outcome_result = grasp(study, run, run.execution_cost, options.stop);
+    if (outcome_result) {
+      run.outcome = std::move(outcome_result).value();
+    } else {
+      run.error = outcome_result.error().message;
     }
-  };
-  std::vector<std::jthread> threads;
-  for (int i = 0; i < std::max(jobs, 1); ++i) threads.emplace_back(work);
-  threads.clear();
+    const std::lock_guard lock(reporting);
+    on_run(run);
+  });
   return runs;
 }
 
@@ -206,7 +222,7 @@ std::string study_table(const GraspingStudy& study, const std::vector<GraspingRu
       }
     }
     const auto with_interval = [&](auto value, int digits) {
-      const Mean mean = mean_of(cell.successes, value);
+      const Mean mean = mean_over(cell.successes, value);
       return fmt::format("{:.{}f} ± {:.{}f}", mean.value, digits, mean.half_width, digits);
     };
     text += fmt::format("{:<8}{:<12}{:<10}{:<16}{:<9}{:<16}{:<18}{:<16}{}\n", cell.level, cell.controller,
@@ -220,7 +236,7 @@ std::string study_table(const GraspingStudy& study, const std::vector<GraspingRu
   return text;
 }
 
-std::string study_json(const GraspingStudy& study, const std::vector<GraspingRun>& runs) {
+nlohmann::json study_json(const GraspingStudy& study, const std::vector<GraspingRun>& runs) {
   nlohmann::json json{{"title", study.title}, {"objects", study.objects}};
   for (const Cell& cell : cells(study, runs)) {
     const Share share = share_of(cell);
@@ -229,10 +245,10 @@ std::string study_json(const GraspingStudy& study, const std::vector<GraspingRun
                             {"successes", share.successes},
                             {"runs", share.runs},
                             {"interval", {share.low, share.high}},
-                            {"replans", mean_of(cell.successes, replans).value},
-                            {"execution_cost", mean_of(cell.successes, cost).value},
-                            {"plan_seconds", mean_of(cell.successes, plan_seconds).value},
-                            {"total_seconds", mean_of(cell.successes, seconds).value}});
+                            {"replans", mean_over(cell.successes, replans).value},
+                            {"execution_cost", mean_over(cell.successes, cost).value},
+                            {"plan_seconds", mean_over(cell.successes, plan_seconds).value},
+                            {"total_seconds", mean_over(cell.successes, seconds).value}});
   }
   for (const GraspingRun& run : runs) {
     const planners::Outcome& outcome = run.outcome;
@@ -250,7 +266,7 @@ std::string study_json(const GraspingStudy& study, const std::vector<GraspingRun
          {"rollouts", outcome.rollouts},
          {"execution_cost", run.execution_cost}});
   }
-  return json.dump(1) + "\n";
+  return json;
 }
 
 }  // namespace jostle::services

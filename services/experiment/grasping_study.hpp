@@ -10,8 +10,10 @@
 
 #include "idl/types/result.hpp"
 #include "physics_pool/scene/generate.hpp"
-#include "services/support/statistics.hpp"
+#include "physics_pool/scene/yaml_fields.hpp"
 #include "services/config/parameters.hpp"
+#include "services/experiment/study.hpp"
+#include "services/support/statistics.hpp"
 
 namespace jostle::services {
 
@@ -27,8 +29,8 @@ struct GraspingStudy {
   std::map<std::string, std::map<std::string, double>> thesis;
 };
 
-/// `name` such as "fig-3.5": a file of the data folder experiments/.
-Result<GraspingStudy> load_grasping_study(const std::string& name);
+/// Of `study: grasping`; `origin` is its file.
+Result<std::unique_ptr<Study>> read_grasping_study(yaml::Fields& fields, const std::string& origin);
 
 /// One scene planned and executed once.
 struct GraspingRun {
@@ -39,15 +41,15 @@ struct GraspingRun {
   double execution_cost = 0.0;  ///< Eq. 3.2 over the observed states, without c_a
 };
 
-/// Runs every combination, `jobs` at a time, each with a pool of one thread.
+/// Runs every combination, options.jobs at a time, each with a pool of one thread.
 /// The world stands still while its planner thinks. `on_run` is called from
 /// one thread at a time. Results are in order of level, controller, seed and
-/// do not depend on `jobs`.
-std::vector<GraspingRun> run_study(const GraspingStudy& study, int jobs,
+/// do not depend on jobs.
+std::vector<GraspingRun> run_study(const GraspingStudy& study, const StudyOptions& options,
                                    const std::function<void(const GraspingRun&)>& on_run);
 
 /// A table with one row per level and controller, beside the thesis's numbers.
 std::string study_table(const GraspingStudy& study, const std::vector<GraspingRun>& runs);
-std::string study_json(const GraspingStudy& study, const std::vector<GraspingRun>& runs);
+nlohmann::json study_json(const GraspingStudy& study, const std::vector<GraspingRun>& runs);
 
 }  // namespace jostle::services

@@ -1,16 +1,15 @@
 // jostle experiment: the thesis's studies, run again.
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
+#include <cstdio>
 #include <optional>
 #include <thread>
 
-#include "services/experiment/grasping_study.hpp"
+#include "services/experiment/study.hpp"
 #include "services/support/files.hpp"
 #include "services/support/program.hpp"
 
@@ -19,88 +18,74 @@ namespace {
 using namespace jostle;
 using namespace jostle::services;
 
-// Studies are the files of experiments/ that have a title; the others are parameters.
-int list_studies() {
-  std::vector<std::string> names;
-  std::error_code problem;
-  for (const auto& entry : std::filesystem::directory_iterator(data_file("experiments"), problem)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
-  }
-  std::ranges::sort(names);
-  for (const std::string& name : names) {
-    if (auto study_result = load_grasping_study(name)) fmt::print("{:<12} {}\n", name, study_result->title);
-  }
-  return 0;
+int list() {
+  for (const auto& [name, title] : list_studies()) fmt::print("{:<12} {}\n", name, title);
+  return kExitOk;
 }
 
 // "1-10" or "7".
-bool parse_seeds(const std::string& text, GraspingStudy& study) {
+std::optional<std::pair<std::uint64_t, std::uint64_t>> parse_seeds(const std::string& text) {
   unsigned long long first = 0, last = 0;
   char rest = 0;
   const int found = std::sscanf(text.c_str(), "%llu-%llu%c", &first, &last, &rest);
   if (found == 1) last = first;
-  if ((found != 1 && found != 2) || last < first) return false;
-  study.first_seed = first;
-  study.last_seed = last;
-  return true;
+  if ((found != 1 && found != 2) || last < first) return {};
+  return std::pair<std::uint64_t, std::uint64_t>(first, last);
+}
+
+int fail(const Error& error) {
+  fmt::print(stderr, "{}\n", error.message);
+  if (error.code == Code::kCancelled) return kExitInterrupted;
+  return error.code == Code::kNotFound || error.code == Code::kInvalidArgument ? kExitUsage : kExitFailed;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app("Runs one of the thesis's studies and prints its table.", "jostle experiment");
-  std::string name, seeds, json;
-  std::vector<std::string> levels, controllers;
+  std::string name, seeds, json, picture;
   std::optional<double> timeout;
-  int jobs = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
+  StudyOptions options{.jobs = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u))};
   app.add_option("name", name, "A study, or `list`")->required();
-  app.add_option("--seeds", seeds, "Scenes, such as 1-10 (default: the study's)");
-  app.add_option("--levels", levels, "Uncertainty levels, such as none,medium")->delimiter(',');
-  app.add_option("--controllers", controllers, "Controllers, such as or,nr")->delimiter(',');
-  app.add_option("--jobs", jobs, "Runs at a time")->capture_default_str()->check(CLI::Range(1, 1024));
-  app.add_option("--timeout", timeout, "Of one run, s (default: the parameters')")->check(CLI::Range(1.0, 1e6));
   app.add_option("--json", json, "File for all numbers");
+  app.add_option("--plot", picture, "PNG file for the figure, where the study has one");
+  app.add_option("--jobs", options.jobs, "Runs at a time")->capture_default_str()->check(CLI::Range(1, 1024));
+  app.add_option("--seeds", seeds, "Scenes, such as 1-10, or the first seed (default: the study's)");
+  app.add_option("--samples", options.samples, "Initial states per group (default: the study's)")->check(CLI::Range(1, 100000));
+  app.add_option("--models", options.models, "Coarse models or predictors, such as planar,learned")->delimiter(',');
+  app.add_option("--levels", options.levels, "Uncertainty levels, such as none,medium")->delimiter(',');
+  app.add_option("--controllers", options.controllers, "Controllers, such as or,nr")->delimiter(',');
+  app.add_option("--timeout", timeout, "Of one run, s (default: the parameters')")->check(CLI::Range(1.0, 1e6));
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
-  if (name == "list") return list_studies();
-  auto study_result = load_grasping_study(name);
-  if (!study_result) {
-    fmt::print(stderr, "{}\n", study_result.error().message);
-    return study_result.error().code == Code::kNotFound ? 2 : 1;
-  }
-  GraspingStudy& study = *study_result;
-  if (!seeds.empty() && !parse_seeds(seeds, study)) {
-    fmt::print(stderr, "--seeds: got '{}', wanted a number or a range such as 1-10\n", seeds);
-    return 2;
-  }
-  if (timeout) study.parameters.control.timeout = std::chrono::milliseconds(std::llround(*timeout * 1e3));
-  if (!levels.empty()) study.levels = levels;
-  if (!controllers.empty()) study.controllers = controllers;
-  for (const std::string& level : study.levels) {
-    if (auto ok = physics_pool::parse_uncertainty(level); !ok) {
-      fmt::print(stderr, "--levels: {}\n", ok.error().message);
-      return 2;
+  if (name == "list") return list();
+  const StopSignal signal;
+  auto study_result = load_study(name);
+  if (!study_result) return fail(study_result.error());
+  if (!seeds.empty()) {
+    options.seeds = parse_seeds(seeds);
+    if (!options.seeds) {
+      fmt::print(stderr, "--seeds: got '{}', wanted a number or a range such as 1-10\n", seeds);
+      return kExitUsage;
     }
   }
+  if (timeout) options.timeout = std::chrono::milliseconds(std::llround(*timeout * 1e3));
+  options.stop = signal.token();
+  options.on_progress = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
 
-  const auto total = study.levels.size() * study.controllers.size() *
-                     (study.last_seed - study.first_seed + 1);
-  std::size_t done = 0;
-  bool broken = false;
-  const auto runs = run_study(study, jobs, [&](const GraspingRun& run) {
-    ++done;
-    broken = broken || !run.error.empty();
-    fmt::print(stderr, "[{:>3}/{}] {:<7} {} seed {:<4} {:<7} {} ({:.0f} s, {} re-plans)\n", done, total,
-               run.level, run.controller, run.seed, run.outcome.success ? "ok" : "FAILED",
-               run.error.empty() ? run.outcome.reason : run.error, run.outcome.total_time.count(),
-               run.outcome.replans);
-  });
-  fmt::print("{}", study_table(study, runs));
+  auto report_result = (*study_result)->run(options);
+  if (!report_result) return fail(report_result.error());
+  const StudyReport& report = *report_result;
+  fmt::print("{}", report.table);
   if (!json.empty()) {
-    if (auto ok = write_text(json, study_json(study, runs)); !ok) {
-      fmt::print(stderr, "{}\n", ok.error().message);
-      return 1;
-    }
+    if (auto ok = write_text(json, report.json.dump(1) + "\n"); !ok) return fail(ok.error());
   }
-  return broken ? 1 : 0;
+  if (!picture.empty()) {
+    if (report.panels.empty()) {
+      fmt::print(stderr, "--plot: this study is a table, it has no figure\n");
+      return kExitUsage;
+    }
+    if (auto ok = plot(picture, (*study_result)->title(), report.panels); !ok) return fail(ok.error());
+  }
+  return report.broken ? kExitFailed : kExitOk;
 }

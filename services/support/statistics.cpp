@@ -36,6 +36,16 @@ Interval median_interval(std::vector<double> values) {
   return {values[outside], values[n - 1 - outside]};
 }
 
+Mean mean_of(const std::vector<double>& values) {
+  if (values.empty()) return {};
+  const auto n = static_cast<double>(values.size());
+  double sum = 0.0, squares = 0.0;
+  for (const double value : values) sum += value;
+  for (const double value : values) squares += (value - sum / n) * (value - sum / n);
+  const double deviation = n > 1 ? std::sqrt(squares / (n - 1)) : 0.0;
+  return {.value = sum / n, .half_width = 1.96 * deviation / std::sqrt(n)};
+}
+
 Share wilson_interval(int successes, int runs) {
   if (runs == 0) return {};
   constexpr double z = 1.959964;  // 95 %

@@ -24,6 +24,13 @@ inline double median(std::vector<double> values) { return quantile(std::move(val
 ///          probability sum_{i<k} C(n,i)/2^n, whatever their distribution.
 Interval median_interval(std::vector<double> values);
 
+/// Mean of values with the half width of its 95 % interval (normal approximation); 0
+/// without values.
+struct Mean {
+  double value = 0.0, half_width = 0.0;
+};
+Mean mean_of(const std::vector<double>& values);
+
 /// Success share of n runs with its 95 % Wilson interval.
 struct Share {
   int successes = 0, runs = 0;

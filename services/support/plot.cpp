@@ -1,4 +1,4 @@
-#include "services/bench/plot.hpp"
+#include "services/support/plot.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>

@@ -5,9 +5,24 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace jostle::planners {
 namespace {
+
+constexpr double kLost = 0.001;    // m; a plan that moves the target less does not push it
+constexpr double kClearance = 0.01;  // m between target and a pusher that goes round it
+constexpr double kBehind = 0.8;    // rad; further off the line of a push the pusher slips off
+
+struct Point {
+  double x = 0.0, y = 0.0;  // m
+};
+
+Point target_in(const physics_pool::TaskGeometry& geometry, const State& x) {
+  const auto target = static_cast<std::size_t>(geometry.layout.target);
+  const auto q = static_cast<std::size_t>(geometry.layout.objects[target].q);
+  return {x.q[q], x.q[q + 1]};
+}
 
 class Run {
  public:
@@ -30,18 +45,27 @@ class Run {
       const auto u = execution_.plan().controls.step(0);
       u_before_.assign(u.begin(), u.end());
       if (auto ok = execution_.act(); !ok) return ok;
-      initial = shifted();
+      initial = warm_start();
     }
     return {};
   }
 
-  // What is left of the plan, filled up to the horizon.
-  ControlSequence shifted() const {
-    ControlSequence controls = execution_.plan().controls;
+  // What is left of the plan, filled up to the horizon. A plan that has lost the target
+  // does not find it again by small changes: then a straight push, from where it is.
+  ControlSequence warm_start() const {
+    const Plan& plan = execution_.plan();
+    if (way_of_target(plan.states) < kLost) return straight(x(), options_.horizon);
+    ControlSequence controls = plan.controls;
     if (const int missing = options_.horizon - controls.steps(); missing > 0) {
-      controls.append(straight(execution_.plan().states.back(), missing).values);
+      controls.append(straight(plan.states.back(), missing).values);
     }
     return controls;
+  }
+
+  // From first to last, m.
+  double way_of_target(const Trajectory& states) const {
+    const Point from = target_in(setup_.geometry, states.front()), to = target_in(setup_.geometry, states.back());
+    return std::hypot(to.x - from.x, to.y - from.y);
   }
 
   ControlSequence straight(const State& from, int steps) const {
@@ -93,13 +117,32 @@ Result<Outcome> run_mpc(const ControlSetup& setup, const MpcOptions& options, co
 
 ControlSequence straight_push(const physics_pool::TaskGeometry& geometry, const State& x, int steps,
                               double step_duration, double speed) {
-  const auto target = static_cast<std::size_t>(geometry.layout.target);
-  const auto q = static_cast<std::size_t>(geometry.layout.objects[target].q);
-  const double dx = geometry.task.goal.x - x.q[q], dy = geometry.task.goal.y - x.q[q + 1];
-  const double distance = std::hypot(dx, dy);
-  const double pace = distance > 0 ? std::min(speed, distance / (steps * step_duration)) / distance : 0.0;
+  const physics_pool::SceneObject& shape = geometry.target;
+  const double radius = shape.shape == physics_pool::Shape::kBox ? std::hypot(shape.size[0], shape.size[1]) / 2 : shape.radius;
+  const double reach = radius + geometry.pusher_radius + kClearance;
+  const double stride = speed * step_duration;
+  Point target = target_in(geometry, x), pusher{x.q[kJointX], x.q[kJointY]};
   ControlSequence controls{.nu = kPusherAxes};
-  for (int t = 0; t < steps; ++t) controls.append(std::array{pace * dx, pace * dy});
+  for (int t = 0; t < steps; ++t) {
+    const double dx = geometry.task.goal.x - target.x, dy = geometry.task.goal.y - target.y;
+    const double way = std::hypot(dx, dy), push = std::atan2(dy, dx);
+    // Where the pusher is as seen from the target: 0 straight behind it.
+    const double around = std::remainder(std::atan2(target.y - pusher.y, target.x - pusher.x) - push, 2 * std::numbers::pi);
+    Point step;
+    if (std::abs(around) <= kBehind) {
+      const double length = std::min(stride, way / (steps - t));
+      step = {length * std::cos(push), length * std::sin(push)};
+      target = {target.x + step.x, target.y + step.y};
+    } else {
+      const double angle = push + around - std::copysign(std::min(std::abs(around), stride / reach), around);
+      const Point to{target.x - reach * std::cos(angle), target.y - reach * std::sin(angle)};
+      const double far = std::hypot(to.x - pusher.x, to.y - pusher.y);
+      const double share = far > stride ? stride / far : 1.0;
+      step = {share * (to.x - pusher.x), share * (to.y - pusher.y)};
+    }
+    pusher = {pusher.x + step.x, pusher.y + step.y};
+    controls.append(std::array{step.x / step_duration, step.y / step_duration});
+  }
   return controls;
 }
 

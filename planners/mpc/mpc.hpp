@@ -31,8 +31,9 @@ struct MpcOptions {
 Result<Outcome> run_mpc(const ControlSetup& setup, const MpcOptions& options, const OnEvent& on_event = {},
                         std::stop_token stop = {});
 
-/// U of `steps` equal controls that push straight from where the target is towards
-/// the centre of its goal region, no further than there, at `speed` m/s at most.
+/// U of `steps` controls that push the target straight towards the centre of its goal
+/// region, no further than there, if nothing is in the way. A pusher that is not
+/// behind the target first goes there, round it, at `speed` m/s at most.
 ControlSequence straight_push(const physics_pool::TaskGeometry& geometry, const State& x, int steps,
                               double step_duration, double speed);
 

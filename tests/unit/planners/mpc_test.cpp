@@ -102,6 +102,9 @@ TEST_F(MpcTest, StartsWarmWithTheShiftedPlanAndAStraightPush) {
   options.straight_speed = 0.1;
   planner.change = [](Plan& plan, int) {
     for (int t = 0; t < plan.controls.steps(); ++t) plan.controls.step(t)[kControlY] = 0.01 * (t + 1);
+    // The pusher stays behind it.
+    plan.states.back().q[kJointX] = 0.1;
+    plan.states.back().q[kJointY] = -0.14;
     const auto target = plan.states.back().q.begin() + kPusherJoints;
     target[0] = 0.2 - 0.03;  // predicted 5 cm before the goal, 3-4-5
     target[1] = -0.04;
@@ -258,12 +261,47 @@ TEST_F(MpcTest, StraightPushEndsAtTheGoalAndKeepsToTheSpeed) {
   EXPECT_NEAR(fast.step(7)[kControlX], 0.05, 1e-12);
   EXPECT_NEAR(fast.step(7)[kControlY], 0.0, 1e-12);
   object(x, 0)[1] = -0.3;  // 3-4-5
+  x.q[kJointX] = -0.2 - 0.08;
+  x.q[kJointY] = -0.3 - 0.06;
   const ControlSequence slow = straight_push(geometry, x, 2, 1.0, 0.1);
   EXPECT_NEAR(slow.step(0)[kControlX], 0.08, 1e-12);
   EXPECT_NEAR(slow.step(0)[kControlY], 0.06, 1e-12);
   object(x, 0)[0] = 0.2;
   object(x, 0)[1] = 0.0;
+  x.q[kJointX] = 0.1;
+  x.q[kJointY] = 0.0;
   EXPECT_THAT(straight_push(geometry, x, 1, 1.0, 0.1).values, testing::ElementsAre(0.0, 0.0));
+}
+
+// From in front of the target: round it on the nearer side, then forward again.
+TEST_F(MpcTest, StraightPushGoesBehindTheTargetFirst) {
+  for (const double side : {-1.0, 1.0}) {
+    x.q[kJointX] = object(x, 0)[0] + 0.08;
+    x.q[kJointY] = side * 0.02;
+    const ControlSequence controls = straight_push(geometry, x, 8, 1.0, 0.1);
+    State at = x;
+    double widest = 0.0;
+    for (int t = 0; t < 8; ++t) {
+      EXPECT_LE(std::hypot(controls.step(t)[kControlX], controls.step(t)[kControlY]), 0.1 + 1e-12);
+      at = tests::moved(at, controls.step(t), 1.0);
+      widest = std::max(widest, side * at.q[kJointY]);
+    }
+    EXPECT_GT(widest, 0.0654);  // the two radii
+    EXPECT_GT(controls.step(7)[kControlX], 0.0);
+    EXPECT_NEAR(controls.step(7)[kControlY], 0.0, 1e-12);
+  }
+}
+
+TEST_F(MpcTest, BeginsAnewWhenThePlanHasLostTheTarget) {
+  planner.change = [](Plan& plan, int) {  // sails past, the target stays
+    for (int t = 0; t < plan.controls.steps(); ++t) plan.controls.step(t)[kControlY] = 0.07;
+  };
+  outcome();
+  ASSERT_GE(planner.problems.size(), 2u);
+  for (const Problem& problem : planner.problems) {
+    EXPECT_EQ(problem.initial,
+              straight_push(geometry, problem.x0, options.horizon, options.step_duration, options.straight_speed));
+  }
 }
 
 }  // namespace

@@ -33,6 +33,10 @@ Result<void> complete(const Arguments& arguments, RunOptions& options) {
   options.planning = physics_pool::perturb(options.scene, options.level, options.seed);
   const bool push = options.scene.task.is_push();
   if (options.controller.empty()) options.controller = push ? "mpc" : "or";
+  if (push != (options.controller == "mpc")) {
+    return Error{Code::kInvalidArgument, fmt::format("--controller: got {} for a task to {}, wanted {}", options.controller,
+                                                     options.scene.task.kind, push ? "mpc" : "or, nr")};
+  }
   const std::filesystem::path file =
       arguments.parameters.empty() ? data_file(push ? "experiments/pushing.yaml" : "experiments/grasping.yaml")
                                    : std::filesystem::path(arguments.parameters);

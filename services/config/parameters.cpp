@@ -54,6 +54,7 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("obstacle_target", objective.obstacle_target);
     in.optional("obstacle_pusher", objective.obstacle_pusher);
     in.optional("obstacle_nearest", objective.obstacle_nearest);
+    in.optional("collision", objective.collision);
     in.optional("intrusion", objective.intrusion);
     in.optional("success_cost", objective.success_cost);
   });

@@ -47,7 +47,7 @@ planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], scales: [0.5, 2
           stop_hopeless: true, freeze: true, screening: 32, screening_time_step: 0.005}
 objective: {goal: 10, angle: 11, acceleration: 12, disturbance: 13, disturbance_rotation: 14, edge: 15, edge_rate: 16,
             edge_exponent_max: 17, edge_margin: 18, topple: 19, topple_angle: 20, drop: 21, drop_height: 22, success_cost: 23, obstruction: 24,
-            obstacle_target: 25, obstacle_pusher: 26, obstacle_nearest: 27, intrusion: 28}
+            obstacle_target: 25, obstacle_pusher: 26, obstacle_nearest: 27, intrusion: 28, collision: 29}
 control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, initial_steps: 27, straight_speed: 0.28,
           few_iterations_max: 30, obstruction_patience: 31,
           timeout: 29.5, close_hand: false}
@@ -73,8 +73,8 @@ mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straig
   EXPECT_THAT((std::vector{o.goal, o.angle, o.acceleration, o.disturbance, o.disturbance_rotation, o.edge,
                            o.edge_rate, o.edge_exponent_max, o.edge_margin, o.topple, o.topple_angle, o.drop,
                            o.drop_height, o.success_cost, o.obstruction, o.obstacle_target, o.obstacle_pusher,
-                           o.obstacle_nearest, o.intrusion}),
-              testing::ElementsAre(10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28));
+                           o.obstacle_nearest, o.intrusion, o.collision}),
+              testing::ElementsAre(10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29));
   EXPECT_EQ(sut.control.many_iterations, 24);
   EXPECT_EQ(sut.control.few_iterations, 25);
   EXPECT_EQ(sut.control.deviation_threshold, 26);

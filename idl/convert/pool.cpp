@@ -34,6 +34,7 @@ msg::ObjectiveWeights to_wire(const Objective& objective) {
   wire.obstacle_target(objective.obstacle_target);
   wire.obstacle_pusher(objective.obstacle_pusher);
   wire.obstacle_nearest(objective.obstacle_nearest);
+  wire.collision(objective.collision);
   wire.intrusion(objective.intrusion);
   wire.success_cost(objective.success_cost);
   return wire;
@@ -57,6 +58,7 @@ Objective from_wire(const msg::ObjectiveWeights& wire) {
           .obstacle_target = wire.obstacle_target(),
           .obstacle_pusher = wire.obstacle_pusher(),
           .obstacle_nearest = wire.obstacle_nearest(),
+          .collision = wire.collision(),
           .intrusion = wire.intrusion(),
           .success_cost = wire.success_cost()};
 }

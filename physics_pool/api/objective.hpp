@@ -35,7 +35,11 @@ struct Objective {
   /// m; centres closer than this count as this far apart: deep inside any obstacle
   /// there is nothing left to tell apart, and costs stay finite.
   double obstacle_nearest = 0.02;
-  double intrusion = 2000.0;    ///< per other object in the goal region and step
+  /// Per step with the target, or the pusher, over the obstacle, and for each of them.
+  /// Eq. 6.10 has nothing of the kind: without it a plan through the obstacle that
+  /// ends at the goal is a success.
+  double collision = 20000.0;
+  double intrusion = 20000.0;   ///< per other object in the goal region and step
   /// C_thresh of Alg. 1: a rollout succeeds when the goal is reached (`at_goal`)
   /// and the cost so far, goal cost included, is at most this.
   double success_cost = 1000.0;

@@ -36,7 +36,8 @@ Result<void> check_weights(const Objective& o) {
       {"edge_margin", o.edge_margin}, {"topple", o.topple}, {"topple_angle", o.topple_angle},
       {"drop", o.drop}, {"drop_height", o.drop_height},
       {"obstruction", o.obstruction}, {"obstacle_target", o.obstacle_target},
-      {"obstacle_pusher", o.obstacle_pusher}, {"intrusion", o.intrusion}, {"success_cost", o.success_cost}};
+      {"obstacle_pusher", o.obstacle_pusher}, {"collision", o.collision},
+      {"intrusion", o.intrusion}, {"success_cost", o.success_cost}};
   for (const auto& [name, value] : weights) {
     if (value >= 0 && std::isfinite(value)) continue;
     return wrong(fmt::format("objective.{}", name), fmt::format("{}", value),

@@ -77,12 +77,19 @@ void write_camera(Writer& xml, const char* name, const std::array<double, 3>& ey
            eye[1], eye[2], -y / level, x / level, -x * z / level, -y * z / level, level, fovy_deg);
 }
 
-// Cameras and light that fit the surface and the hand in front of it.
-void write_view(Writer& xml, const Surface& surface) {
+// Cameras and light that fit the surface, and a hand in front of it.
+void write_view(Writer& xml, const Surface& surface, bool hand_in_front) {
   // The cameras were placed for the table of Sec. 3.3.1; a shelf's walls need more room.
   const double walls = surface.kind == Surface::Kind::kShelf ? 0.06 : 0.0;
   const double scale = (std::max(surface.size[0], surface.size[1]) + walls) / 0.6;
   xml.line(R"(<light pos="-0.9 -0.1 2.0" dir="0.48 0.16 -1" directional="true" diffuse="0.55 0.55 0.54" specular="0.25 0.25 0.25"/>)");
+  if (!hand_in_front) {
+    // A surface of 1.0 m x 0.8 m fills the picture.
+    const double size = std::max(surface.size[0], surface.size[1] / 0.8) + walls;
+    write_camera(xml, "overview", {-0.1 * size, -0.82 * size, 1.16 * size}, {0.01 * size, -0.05 * size, 0.0}, 36);
+    write_camera(xml, "top", {0.0, -0.01 * size, 1.3 * size}, {0.0, 0.0, 0.0}, 40);
+    return;
+  }
   write_camera(xml, "overview", {-0.15 * scale, -0.66 * scale, 1.00 * scale},
                {-0.07 * scale, -0.025 * scale, 0.0}, 36);
   write_camera(xml, "top", {-0.1 * scale, -0.01 * scale, 1.2 * scale}, {-0.1 * scale, 0.0, 0.0}, 40);
@@ -188,7 +195,7 @@ std::string model_xml(const Scene& scene, const ModelContent& content) {
   xml.line(R"(<size nconmax="{}" njmax="{}" nuser_geom="1"/>)", contacts, 4 * contacts + 8);
   write_looks(xml, content.looks);
   xml.line("<worldbody>");
-  write_view(xml, scene.surface);
+  write_view(xml, scene.surface, !scene.robot.is_pusher());
   write_surface(xml, scene.surface);
   if (scene.robot.is_pusher()) {
     write_pusher(xml, scene.robot);

@@ -70,6 +70,7 @@ TaskGeometry::TaskGeometry(const Scene& scene)
       task(scene.task),
       target(scene.objects.at(static_cast<std::size_t>(layout.target))),
       pusher_radius(scene.robot.is_pusher() ? scene.robot.radius : 0.0) {
+  target.name.clear();  // a copy must not allocate
   for (const SceneObject& object : scene.objects) rest_heights.push_back(object.rest_height());
 }
 
@@ -194,6 +195,10 @@ bool pusher_hits_obstacle(const TaskGeometry& geometry, const State& x) {
   return squared_distance(*geometry.task.obstacle, &x.q[kJointX]) < reach * reach;
 }
 
+int count_collisions(const TaskGeometry& geometry, const State& x) {
+  return (target_hits_obstacle(geometry, x) ? 1 : 0) + (pusher_hits_obstacle(geometry, x) ? 1 : 0);
+}
+
 std::vector<int> dropped_objects(const TaskGeometry& geometry, const State& x, double height) {
   std::vector<int> dropped;
   for (std::size_t i = 0; i < geometry.layout.objects.size(); ++i) {
@@ -234,6 +239,7 @@ double running_cost(const TaskGeometry& geometry, const Objective& objective,
          objective.topple * toppled_objects(geometry, x1, objective.topple_angle) +
          objective.drop * count_dropped(geometry, x1, objective.drop_height) +
          obstacle_cost(geometry, x1, objective) +
+         objective.collision * count_collisions(geometry, x1) +
          objective.intrusion * count_intruders(geometry, x1);
 }
 

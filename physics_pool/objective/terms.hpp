@@ -22,7 +22,7 @@ struct TaskGeometry {
   double half_x = 0.0, half_y = 0.0;  ///< m, half extents of the surface
   std::vector<double> rest_heights;   ///< [objects] m
   SceneTask task;
-  SceneObject target;          ///< its shape; where it is says the state
+  SceneObject target;          ///< its shape, without a name; where it is says the state
   double pusher_radius = 0.0;  ///< m; 0 for a gripper
 };
 
@@ -72,6 +72,7 @@ int count_intruders(const TaskGeometry& geometry, const State& x);
 /// Whether the target's, or the pusher's, footprint is over the obstacle.
 bool target_hits_obstacle(const TaskGeometry& geometry, const State& x);
 bool pusher_hits_obstacle(const TaskGeometry& geometry, const State& x);
+int count_collisions(const TaskGeometry& geometry, const State& x);  ///< of the two, how many
 
 /// Indices of objects whose centre is more than `height` m below its resting place.
 std::vector<int> dropped_objects(const TaskGeometry& geometry, const State& x, double height);

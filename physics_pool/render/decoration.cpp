@@ -16,6 +16,9 @@ constexpr Colour kPadColour{0.13f, 0.13f, 0.14f, 1.0f};
 constexpr Colour kFlangeColour{0.30f, 0.31f, 0.33f, 1.0f};
 constexpr Colour kJointColour{0.42f, 0.56f, 0.68f, 1.0f};
 
+constexpr Colour kGoalColour{0.85f, 0.16f, 0.12f, 0.45f};
+constexpr Colour kObstacleColour{0.10f, 0.10f, 0.11f, 0.85f};
+
 // A shape fixed to a frame of the simulation.
 struct Ornament {
   int type;      // mjtGeom
@@ -57,9 +60,21 @@ void add_wrist(const mjModel& model, const mjData& data, mjvScene& scene) {
   cap(-hand::kPalmDepth - hand::kArmLength + 0.045, 0.032, 0.016, kJointColour);
 }
 
+// Flat, its top `height` metres above the surface: the higher one covers the other.
+void add_disc(const Disc& disc, double height, const Colour& colour, mjvScene& scene) {
+  constexpr double kThickness = 0.0002;  // m
+  constexpr Vector kOrigin{0, 0, 0};
+  constexpr std::array<mjtNum, 9> kUpright{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  add(kOrigin.data(), kUpright.data(),
+      {mjGEOM_CYLINDER, {disc.radius, kThickness / 2, 0}, {disc.x, disc.y, height - kThickness / 2}, colour}, scene);
+  if (scene.ngeom > 0) scene.geoms[scene.ngeom - 1].category = mjCAT_DECOR;  // no shadow
+}
+
 }  // namespace
 
-void decorate(const mjModel& model, const mjData& data, mjvScene& scene) {
+void decorate(const SceneTask& task, const mjModel& model, const mjData& data, mjvScene& scene) {
+  if (task.is_push()) add_disc(task.goal, 0.001, kGoalColour, scene);
+  if (task.obstacle) add_disc(*task.obstacle, 0.002, kObstacleColour, scene);
   if (mj_name2id(&model, mjOBJ_BODY, "gripper") < 0) return;
   add_pad(model, data, "finger_left", scene);
   add_pad(model, data, "finger_right", scene);

@@ -96,7 +96,7 @@ Result<Picture> Renderer::render(const State& state) {
     mj_comPos(model, p.data.get());
     mj_camlight(model, p.data.get());
     mjv_updateScene(model, p.data.get(), &p.visible, nullptr, &p.camera, mjCAT_ALL, &p.draw_list);
-    decorate(*model, *p.data, p.draw_list);
+    decorate(p.world->scene().task, *model, *p.data, p.draw_list);
     mjr_render(area, &p.draw_list, &context);
   });
 }

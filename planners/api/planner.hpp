@@ -20,6 +20,7 @@ struct Problem {
   Hash world;               ///< planning world, known to the pool
   State x0;
   ControlSequence initial;  ///< candidate to improve, at least one step
+  std::vector<double> u_before;  ///< [nu] control before its first step; empty: at rest
   int iterations = 50;      ///< I_max
   std::uint64_t seed = 0;
   std::uint32_t stream = 0; ///< first noise stream; one is used per iteration

@@ -81,7 +81,10 @@ Pbsto::Pbsto(physics_pool::Pool& pool, PbstoOptions options, OnProgress on_progr
 
 Result<Plan> Pbsto::plan(const Problem& problem, TimePoint deadline, std::stop_token stop) {
   const RolloutBatch pattern{.step_duration = options_.step_duration,
-                             .law = {.sigma = options_.sigma, .limit = options_.limit, .scales = options_.scales},
+                             .law = {.sigma = options_.sigma,
+                                     .limit = options_.limit,
+                                     .scales = options_.scales,
+                                     .persistence = options_.persistence},
                              .objective = options_.objective,
                              .stop_losers = options_.stop_losers,
                              .stop_hopeless = options_.stop_hopeless,

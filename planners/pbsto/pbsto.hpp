@@ -21,6 +21,7 @@ struct PbstoOptions {
   /// Factors of sigma dealt out to the K samples in turn. Small ones first: of
   /// several samples that succeed the one with the lowest index is taken.
   std::vector<double> scales{0.125, 0.25, 0.5, 1.0};
+  double persistence = 0.0;  ///< of the noise from step to step, in [0, 1) (SamplingLaw)
   Update update = Update::kGreedy;
   double lambda = 100.0;       ///< of Eq. 5.8, in units of cost; small is greedy
   int min_steps = 2;           ///< n_min of Alg. 1

@@ -22,7 +22,8 @@ Search::Search(physics_pool::Pool& pool, const Problem& problem, RolloutBatch pa
       on_progress_(on_progress) {
   pattern_.world = problem.world;
   pattern_.x0 = problem.x0;
-  pattern_.u_before.assign(static_cast<std::size_t>(problem.initial.nu), 0.0);
+  pattern_.u_before = problem.u_before;
+  if (problem.u_before.empty()) pattern_.u_before.assign(static_cast<std::size_t>(problem.initial.nu), 0.0);
   pattern_.law.seed = problem.seed;
   if (!problem.clear_hand) pattern_.objective.obstruction = 0.0;
   pattern_.stop_on_success = true;

@@ -16,6 +16,7 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
   Parameters parameters;
   PbstoOptions& planner = parameters.planner;
   ControlOptions& control = parameters.control;
+  planners::MpcOptions& mpc = parameters.mpc;
   physics_pool::Objective& objective = planner.objective;
   yaml::Fields fields(root, "", origin);
   fields.optional("step_duration", planner.step_duration);
@@ -28,6 +29,7 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.choice<PbstoOptions::Update>("update", planner.update,
         {{"greedy", PbstoOptions::Update::kGreedy}, {"cost-weighted", PbstoOptions::Update::kCostWeighted}});
     in.optional("lambda", planner.lambda);
+    in.optional("persistence", planner.persistence);
     in.optional("stop_losers", planner.stop_losers);
     in.optional("stop_hopeless", planner.stop_hopeless);
     in.optional("freeze", planner.freeze);
@@ -52,6 +54,7 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("obstacle_target", objective.obstacle_target);
     in.optional("obstacle_pusher", objective.obstacle_pusher);
     in.optional("obstacle_nearest", objective.obstacle_nearest);
+    in.optional("collision", objective.collision);
     in.optional("intrusion", objective.intrusion);
     in.optional("success_cost", objective.success_cost);
   });
@@ -66,8 +69,15 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("close_hand", control.close_hand);
     in.optional("timeout", timeout);
   });
+  fields.section("mpc", false, [&](yaml::Fields& in) {
+    in.optional("horizon", mpc.horizon);
+    in.optional("first_iterations", mpc.first_iterations);
+    in.optional("iterations", mpc.iterations);
+    in.optional("max_actions", mpc.max_actions);
+    in.optional("straight_speed", mpc.straight_speed);
+  });
   fields.finish();
-  control.step_duration = planner.step_duration;
+  control.step_duration = mpc.step_duration = planner.step_duration;
   control.min_steps = planner.min_steps;
   return parameters;
 }
@@ -82,6 +92,7 @@ struct Range {
 Result<void> check(const Parameters& parameters, double timeout, const std::string& origin) {
   const PbstoOptions& planner = parameters.planner;
   const ControlOptions& control = parameters.control;
+  const planners::MpcOptions& mpc = parameters.mpc;
   for (const Range& range : {Range{"planner.rollouts", double(planner.rollouts), 1, physics_pool::kMaxSamples},
                              Range{"planner.screening", double(planner.screening), 1, 1e4},
                              Range{"planner.screening_time_step", planner.screening_time_step, 1e-4, physics_pool::kMaxTimeStep},
@@ -95,6 +106,11 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
                              Range{"control.deviation_threshold", control.deviation_threshold, 0, 1e6},
                              Range{"control.initial_steps", double(control.initial_steps), 1, physics_pool::kMaxSteps},
                              Range{"control.straight_speed", control.straight_speed, 0, 1},
+                             Range{"mpc.horizon", double(mpc.horizon), 1, physics_pool::kMaxSteps},
+                             Range{"mpc.first_iterations", double(mpc.first_iterations), 0, 1e6},
+                             Range{"mpc.iterations", double(mpc.iterations), 0, 1e6},
+                             Range{"mpc.max_actions", double(mpc.max_actions), 1, 1e6},
+                             Range{"mpc.straight_speed", mpc.straight_speed, 0, 1},
                              Range{"control.timeout", timeout, 1, 1e6}}) {
     if (range.value >= range.low && range.value <= range.high) continue;  // false for NaN
     return Error{Code::kInvalidArgument, fmt::format("{}: {}: got {}, wanted {} to {}", origin, range.key,
@@ -128,7 +144,7 @@ Result<Parameters> parse_parameters(std::string_view text, const std::string& or
     double timeout = std::chrono::duration<double>(ControlOptions{}.timeout).count();
     Parameters parameters = read(root, origin, timeout);
     if (auto ok = check(parameters, timeout, origin); !ok) return ok.error();
-    parameters.control.timeout = std::chrono::milliseconds(std::llround(timeout * 1e3));
+    parameters.control.timeout = parameters.mpc.timeout = std::chrono::milliseconds(std::llround(timeout * 1e3));
     return parameters;
   });
 }

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Parameters of planners and controllers as files. `experiments/chapter3.yaml`
-/// documents every key.
+/// Parameters of planners and controllers as files. `experiments/chapter3.yaml` and
+/// `experiments/pushing.yaml` document every key.
 
 #include <filesystem>
 #include <string>
@@ -9,13 +9,15 @@
 
 #include "idl/types/result.hpp"
 #include "planners/control/controller.hpp"
+#include "planners/mpc/mpc.hpp"
 #include "planners/pbsto/pbsto.hpp"
 
 namespace jostle::services {
 
 struct Parameters {
   planners::PbstoOptions planner;
-  planners::ControlOptions control;
+  planners::ControlOptions control;  ///< grasping
+  planners::MpcOptions mpc;          ///< pushing
 };
 
 /// Keys that a file leaves out keep their defaults; unknown keys are refused.

@@ -28,10 +28,12 @@ const char* word(planners::Phase phase) {
   return "";
 }
 
-Result<planners::ControlOptions::Method> parse_controller(const std::string& name) {
-  if (name == "or") return planners::ControlOptions::Method::kOnline;
-  if (name == "nr") return planners::ControlOptions::Method::kNaive;
-  return Error{Code::kInvalidArgument, fmt::format("controller: got '{}', wanted or, nr", name)};
+Result<planners::ControlOptions::Method> parse_controller(const std::string& name, const physics_pool::SceneTask& task) {
+  if (task.is_push() && name == "mpc") return planners::ControlOptions::Method::kOnline;  // asked of nobody
+  if (!task.is_push() && name == "or") return planners::ControlOptions::Method::kOnline;
+  if (!task.is_push() && name == "nr") return planners::ControlOptions::Method::kNaive;
+  return Error{Code::kInvalidArgument, fmt::format("controller: got '{}' for a task to {}, wanted {}", name,
+                                                   task.kind, task.is_push() ? "mpc" : "or, nr")};
 }
 
 // What the asker puts into result.json and draws.
@@ -47,6 +49,7 @@ std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::
                         {"replans", outcome.replans},
                         {"actions", outcome.actions},
                         {"plan_seconds", outcome.plan_time.count()},
+                        {"planning_seconds", outcome.planning_time.count()},
                         {"total_seconds", outcome.total_time.count()},
                         {"rollouts", outcome.rollouts},
                         {"dropped_objects", outcome.dropped},
@@ -131,18 +134,22 @@ Result<Coordinator::Task> Coordinator::prepare(const Goal& goal) {
   if (!planning_result) return planning_result.error();
   auto parameters_result = parse_parameters(goal.parameters(), "goal.parameters");
   if (!parameters_result) return parameters_result.error();
-  auto method_result = parse_controller(goal.controller());
+  auto method_result = parse_controller(goal.controller(), planning_result->task);
   if (!method_result) return method_result.error();
-  auto world_result = pool_.load(*planning_result);
+  physics_pool::Pool& predictor = predictor_of(goal);
+  auto world_result = predictor.load(*planning_result);
   if (!world_result) return world_result.error();
   Task task{.execution = std::move(execution_result).value(),
             .planning = std::move(planning_result).value(),
             .parameters = std::move(parameters_result).value(),
+            .predictor = predictor,
             .world = *world_result};
   task.parameters.control.method = *method_result;
-  task.parameters.control.plan_only = goal.plan_only();
+  task.parameters.control.plan_only = task.parameters.mpc.plan_only = goal.plan_only();
   return task;
 }
+
+physics_pool::Pool& Coordinator::predictor_of(const Goal&) { return pool_; }
 
 Result<planners::Outcome> Coordinator::perform(const Goal& goal, const Task& task, std::stop_token stop) {
   auto believed_result = physics_pool::World::compile(task.planning);
@@ -152,7 +159,7 @@ Result<planners::Outcome> Coordinator::perform(const Goal& goal, const Task& tas
 
   RobotClient robot(participant_);
   ObjectsClient objects(participant_, robot);
-  planners::Pbsto planner(pool_, task.parameters.planner,
+  planners::Pbsto planner(task.predictor, task.parameters.planner,
                           [&](const planners::Progress& progress) { note(progress, geometry); });
   planners::ControlSetup setup{.planner = planner,
                                .robot = robot,
@@ -166,9 +173,9 @@ Result<planners::Outcome> Coordinator::perform(const Goal& goal, const Task& tas
   if (task.world != physics_pool::scene_hash(task.execution)) {
     setup.make_feasible = [&believed](const State& x) { return physics_pool::separate(*believed, x); };
   }
-  return planners::run_controller(
-      setup, task.parameters.control,
-      [&](const planners::ControlEvent& event) { note(event, geometry); }, std::move(stop));
+  const auto on_event = [&](const planners::ControlEvent& event) { note(event, geometry); };
+  if (geometry.task.is_push()) return planners::run_mpc(setup, task.parameters.mpc, on_event, std::move(stop));
+  return planners::run_controller(setup, task.parameters.control, on_event, std::move(stop));
 }
 
 void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
@@ -193,7 +200,7 @@ void Coordinator::note(const planners::ControlEvent& event, const physics_pool::
   feedback_.replans(event.replans);
   if (event.phase == planners::Phase::kPlanning) rollouts_before_ = feedback_.rollouts();
   if (event.observed && !event.observed->q.empty()) {
-    feedback_.target_distance(physics_pool::target_bearing(geometry, *event.observed).distance);
+    feedback_.target_distance(physics_pool::goal_distance(geometry, *event.observed));
   }
 }
 
@@ -203,7 +210,7 @@ void Coordinator::note(const planners::Progress& progress, const physics_pool::T
   feedback_.cost(progress.cost);
   feedback_.rollouts(rollouts_before_ + progress.rollouts);
   if (progress.final_state) {
-    feedback_.target_distance(physics_pool::target_bearing(geometry, *progress.final_state).distance);
+    feedback_.target_distance(physics_pool::goal_distance(geometry, *progress.final_state));
   }
 }
 

@@ -38,8 +38,13 @@ class Coordinator {
   struct Task {
     physics_pool::Scene execution, planning;
     Parameters parameters;
-    Hash world;
+    physics_pool::Pool& predictor;  ///< what plans are made with
+    Hash world;                     ///< planning world, known to the predictor
   };
+
+  /// The pool that predicts for a goal's planner. What stands between the workers
+  /// and the planner is chosen here and nowhere else.
+  physics_pool::Pool& predictor_of(const Goal& goal);
 
   Result<Task> prepare(const Goal& goal);
   Result<planners::Outcome> perform(const Goal& goal, const Task& task, std::stop_token stop);

@@ -1,4 +1,4 @@
-// jostle run: one scene, from start to grasp, on this machine.
+// jostle run: one scene, from start to grasp or goal, on this machine.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -31,8 +31,14 @@ Result<void> complete(const Arguments& arguments, RunOptions& options) {
   if (!scene_result) return scene_result.error();
   options.scene = std::move(scene_result).value();
   options.planning = physics_pool::perturb(options.scene, options.level, options.seed);
+  const bool push = options.scene.task.is_push();
+  if (options.controller.empty()) options.controller = push ? "mpc" : "or";
+  if (push != (options.controller == "mpc")) {
+    return Error{Code::kInvalidArgument, fmt::format("--controller: got {} for a task to {}, wanted {}", options.controller,
+                                                     options.scene.task.kind, push ? "mpc" : "or, nr")};
+  }
   const std::filesystem::path file =
-      arguments.parameters.empty() ? data_file("experiments/grasping.yaml")
+      arguments.parameters.empty() ? data_file(push ? "experiments/pushing.yaml" : "experiments/grasping.yaml")
                                    : std::filesystem::path(arguments.parameters);
   auto parameters_result = read_text(file);
   if (!parameters_result) return parameters_result.error();
@@ -76,13 +82,14 @@ int main(int argc, char** argv) {
   app.add_option("scene", arguments.scene, "Scene file; `jostle scene generate` makes one")->required();
   app.add_option("--workers", options.workers, "Worker processes, or threads (default: one per core)")
       ->check(CLI::Range(0, 1024));
-  app.add_option("--controller", options.controller, "or: online re-planning; nr: naive re-planning")
-      ->capture_default_str()->check(CLI::IsMember({"or", "nr"}));
+  app.add_option("--controller", options.controller, "To grasp, or: online re-planning (default), nr: naive "
+                                                        "re-planning; to push, mpc: model-predictive control (default)")
+      ->check(CLI::IsMember({"or", "nr", "mpc"}));
   app.add_option("--uncertainty", arguments.level, "none, low, medium or high")->capture_default_str();
   app.add_option("--seed", options.seed, "Of all noise, the planner's and the world's")->capture_default_str();
   app.add_option("--pool", options.pool, "dds: worker processes; threads: threads of the coordinator")
       ->capture_default_str()->check(CLI::IsMember({"dds", "threads"}));
-  app.add_option("--parameters", arguments.parameters, "Planner's and controller's (default: experiments/grasping.yaml)");
+  app.add_option("--parameters", arguments.parameters, "Planner's and controller's (default: experiments/grasping.yaml, or pushing.yaml)");
   app.add_option("--json", options.json, "File for the result");
   app.add_option("--picture", options.picture, "PNG of the execution");
   app.add_option("--rate", options.rate, "World seconds per second while acting; 0: as fast as possible")
@@ -90,7 +97,7 @@ int main(int argc, char** argv) {
   app.add_flag("--plan-only", options.plan_only, "Stop after the first plan");
   app.add_flag("--headless", options.headless, "Plain lines instead of a live display");
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
-  app.footer("Exit codes: 0 grasped, 1 not grasped, 2 bad input, 3 a part of the system failed, 130 interrupted.");
+  app.footer("Exit codes: 0 grasped or pushed to its goal, 1 not, 2 bad input, 3 a part of the system failed, 130 interrupted.");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (options.pool == "threads" && options.workers == 0) {
     return fail({Code::kInvalidArgument, "--workers: got 0, wanted at least 1 thread"}, kExitUsage);

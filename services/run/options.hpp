@@ -17,7 +17,7 @@ struct RunOptions {
   physics_pool::Scene planning;  ///< what the planner believes
   std::string parameters;        ///< YAML text
   physics_pool::Uncertainty level = physics_pool::Uncertainty::kNone;
-  std::string controller = "or";
+  std::string controller;  ///< "or" or "nr" to grasp, "mpc" to push
   std::string pool = "dds";
   int workers = 2;
   std::uint64_t seed = 1;

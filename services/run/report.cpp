@@ -24,7 +24,7 @@ json frames_of(const json& states, const RunOptions& options, const json& report
     const std::size_t at = shown == 1 ? 0 : i * (count - 1) / (shown - 1);
     std::string caption = fmt::format("{}t = {} s", options.plan_only ? "plan, " : "", at);
     if (at + 1 == count && !options.plan_only) {
-      caption += success ? "  (grasped)" : fmt::format("  ({})", report["reason"].get<std::string>());
+      caption += success ? options.scene.task.is_push() ? "  (at the goal)" : "  (grasped)" : fmt::format("  ({})", report["reason"].get<std::string>());
     }
     frames.push_back({{"caption", caption}, {"q", states[at]}});
   }

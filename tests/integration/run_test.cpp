@@ -53,6 +53,44 @@ TEST_F(Run, GraspsTheTargetOfAnEasySceneAndTellsAll) {
   EXPECT_TRUE(run_folders().empty());
 }
 
+// Every process of it: coordinator, simulated world, two workers.
+TEST_F(Run, PushesTheTargetToItsGoalAndTellsAll) {
+  const auto scene = folder.write("push.yaml", physics_pool::to_yaml(push_ahead()));
+  const std::string picture = folder.path() / "push.png";
+
+  ASSERT_EQ(finish({scene, "--workers", "2", "--seed", "7", "--json", result_file(), "--picture", picture}), 0)
+      << run->err();
+
+  const json report = result();
+  EXPECT_EQ(report["success"], true);
+  EXPECT_EQ(report["reason"], "target in the goal region");
+  EXPECT_EQ(report["controller"], "mpc");
+  EXPECT_EQ(report["replans"], report["actions"].get<int>() - 1);
+  EXPECT_GE(report["planning_seconds"], report["plan_seconds"]);
+  EXPECT_GE(report["total_seconds"], report["planning_seconds"]);
+  EXPECT_EQ(report["observed_states"].size(), report["actions"].get<std::size_t>() + 1);
+  EXPECT_THAT(run->out(), HasSubstr("SUCCESS"));
+  EXPECT_TRUE(std::filesystem::exists(picture));
+}
+
+TEST_F(Run, PushesAlikeWithThreadsAndWorkers) {
+  const auto scene = folder.write("push.yaml", physics_pool::to_yaml(push_around()));
+  const auto parameters = folder.write("never.yaml", "planner: {rollouts: 8, sigma: [0.01, 0.01], limit: [0.1, 0.1]}\n"
+                                                     "objective: {success_cost: 1.0e-9}\nmpc: {first_iterations: 3}\n");
+  std::optional<json> first;
+  for (const char* pool : {"threads", "dds"}) {
+    SCOPED_TRACE(pool);
+    ASSERT_EQ(finish({scene, "--plan-only", "--pool", pool, "--parameters", parameters, "--json", result_file()}), 1)
+        << run->err();  // no plan is good enough
+
+    const json report = result();
+    if (!first) first = report;
+    EXPECT_EQ(report["iterations"], 3);
+    EXPECT_EQ(report["plan_hash"], (*first)["plan_hash"]);
+    EXPECT_EQ(report["rollouts"], (*first)["rollouts"]);
+  }
+}
+
 TEST_F(Run, NamesTheSceneByTheHashThatCheckPrints) {
   const auto check = program("jostle_scene", {"check", easy});
   ASSERT_EQ(check->wait(kPatience), 0);

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Robot, ObjectSource and Planner without physics: the hand moves exactly as
+/// Robot, ObjectSource and Planner without physics: hand or pusher moves exactly as
 /// told, objects stand still, and tests step in where they like.
 
 #include <functional>
@@ -18,6 +18,7 @@ namespace jostle::tests {
 inline State moved(State x, std::span<const double> u, double duration) {
   x.q[kJointX] += u[kControlX] * duration;
   x.q[kJointY] += u[kControlY] * duration;
+  if (u.size() == kPusherAxes) return x;
   x.q[kJointRotation] += u[kControlRotation] * duration;
   x.q[kJointLeft] += u[kControlOpening] * duration / 2;
   x.q[kJointRight] += u[kControlOpening] * duration / 2;
@@ -26,12 +27,12 @@ inline State moved(State x, std::span<const double> u, double duration) {
 
 class KinematicRobot final : public robot_bridge::Robot {
  public:
-  explicit KinematicRobot(State& x) : x_(x) {}
+  explicit KinematicRobot(State& x, int joints = kGripperJoints) : x_(x), joints_(joints) {}
 
   Result<robot_bridge::RobotReading> read() override {
     if (read_error) return *read_error;
-    return robot_bridge::RobotReading{.q = {x_.q.begin(), x_.q.begin() + kGripperJoints},
-                                      .v = std::vector<double>(kGripperJoints, 0.0),
+    return robot_bridge::RobotReading{.q = {x_.q.begin(), x_.q.begin() + joints_},
+                                      .v = std::vector<double>(static_cast<std::size_t>(joints_), 0.0),
                                       .object_in_hand = object_in_hand};
   }
 
@@ -53,6 +54,7 @@ class KinematicRobot final : public robot_bridge::Robot {
 
  private:
   State& x_;
+  int joints_;
 };
 
 class KinematicObjects final : public perception::ObjectSource {
@@ -98,7 +100,7 @@ class KinematicPlanner final : public planners::Planner {
       plan.states.push_back(moved(plan.states.back(), plan.controls.step(t), step_duration));
     }
     plan.cost = 1.0;
-    plan.at_goal = predicts_grasp;
+    plan.at_goal = predicts_goal;
     plan.iterations = problem.iterations;
     plan.rollouts = 10;
     if (change) change(plan, static_cast<int>(problems.size()));
@@ -106,7 +108,7 @@ class KinematicPlanner final : public planners::Planner {
   }
 
   double step_duration = 1.0;
-  bool predicts_grasp = true;
+  bool predicts_goal = true;
   std::optional<Error> error;
   std::function<void(planners::Plan&, int plans)> change;
   std::vector<planners::Problem> problems;

@@ -135,6 +135,7 @@ const std::vector<Case> kCases{
     {"NaNObstaclePusher", [](B& b) { b.objective.obstacle_pusher = kNaN; }, "objective.obstacle_pusher", "nan", ">= 0"},
     {"NoObstacleCap", [](B& b) { b.objective.obstacle_nearest = 0; }, "objective.obstacle_nearest", "0 m", ">= 0.001 m"},
     {"NaNObstacleCap", [](B& b) { b.objective.obstacle_nearest = kNaN; }, "objective.obstacle_nearest", "nan", ">= 0.001 m"},
+    {"NegativeCollision", [](B& b) { b.objective.collision = -1; }, "objective.collision", "-1", ">= 0"},
     {"NegativeIntrusion", [](B& b) { b.objective.intrusion = -1; }, "objective.intrusion", "-1", ">= 0"},
     {"NaNSuccess", [](B& b) { b.objective.success_cost = kNaN; }, "objective.success_cost", "nan", ">= 0"},
 };

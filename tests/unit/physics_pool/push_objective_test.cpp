@@ -98,6 +98,18 @@ TEST_F(PushTerms, PusherHitsTheObstacleWhereDiscsMeet) {
   EXPECT_TRUE(pusher_hits_obstacle(geometry, start));
 }
 
+TEST_F(PushTerms, CollisionsCountTargetAndPusher) {
+  EXPECT_EQ(count_collisions(geometry, start), 0);
+  place(start, 0, 0.05, 0.0);
+  EXPECT_EQ(count_collisions(geometry, start), 1);
+  start.q[kJointX] = -0.02;
+  EXPECT_EQ(count_collisions(geometry, start), 2);
+  const Objective weights{.acceleration = 0, .disturbance = 0, .obstacle_target = 0, .obstacle_pusher = 0,
+                          .collision = 7};
+  const std::vector<double> u{0, 0};
+  EXPECT_EQ(running_cost(geometry, weights, u, u, start, start), 14.0);
+}
+
 TEST_F(PushTerms, IntrudersAreOthersWhoseCentreIsInTheGoalRegion) {
   place(start, 0, 0.2, 0.0);  // the target is none
   EXPECT_EQ(count_intruders(geometry, start), 0);
@@ -124,7 +136,7 @@ TEST_F(PushTerms, RunningCostIsTheWeightedSum) {
   place(after, 0, 0.0, 0.2);
   place(after, 1, 0.2, 0.0);  // from (0, 0.25)
   object(after, 0)[2] -= 0.03;
-  after.q[kJointX] = 0.1;
+  after.q[kJointX] = -0.1;
   after.q[kJointY] = 0.0;
   const std::vector<double> u_before{0, 0}, u{0.1, 0.2};
   EXPECT_NEAR(running_cost(geometry, weights, u_before, u, start, after),

@@ -166,7 +166,7 @@ TEST_P(EitherController, ExecutesNothingWhenOnlyPlanning) {
   options.plan_only = true;
   for (const bool grasps : {true, false}) {
     planner.problems.clear();
-    planner.predicts_grasp = grasps;
+    planner.predicts_goal = grasps;
     const Outcome result = outcome();
     EXPECT_EQ(result.success, grasps);
     EXPECT_THAT(result.reason, HasSubstr("not executed"));
@@ -278,7 +278,7 @@ TEST_F(OnlineReplanning, DoesNotReplanWhileAllGoesAsPredicted) {
 }
 
 TEST_F(OnlineReplanning, ReplansAfterEveryActionWhileNoGraspIsPredicted) {
-  planner.predicts_grasp = false;
+  planner.predicts_goal = false;
   grasp_after(4);
   const Outcome result = outcome();
   EXPECT_EQ(result.actions, 4);
@@ -286,7 +286,7 @@ TEST_F(OnlineReplanning, ReplansAfterEveryActionWhileNoGraspIsPredicted) {
 }
 
 TEST_F(OnlineReplanning, IteratesMoreWhileReplansFallShort) {
-  planner.predicts_grasp = false;
+  planner.predicts_goal = false;
   options.few_iterations_max = 6;
   grasp_after(6);
   (void)outcome();
@@ -296,14 +296,14 @@ TEST_F(OnlineReplanning, IteratesMoreWhileReplansFallShort) {
 }
 
 TEST_F(OnlineReplanning, FillsTheHorizonUpWhileReplansFallShort) {
-  planner.predicts_grasp = false;
+  planner.predicts_goal = false;
   grasp_after(3);
   (void)outcome();
   for (const Problem& problem : planner.problems) EXPECT_EQ(problem.initial.steps(), options.initial_steps);
 }
 
 TEST_F(OnlineReplanning, DemandsAClearHandOnlyAfterPatienceAndWithSomethingInIt) {
-  planner.predicts_grasp = false;
+  planner.predicts_goal = false;
   options.obstruction_patience = 2;
   grasp_after(7, [this](int done) {  // from the fourth action on, the can goes along in the hand
     object(1)[0] = done >= 4 ? x.q[kJointX] + 0.03 : 5.0;
@@ -316,7 +316,7 @@ TEST_F(OnlineReplanning, DemandsAClearHandOnlyAfterPatienceAndWithSomethingInIt)
 }
 
 TEST_F(OnlineReplanning, BacksOffByAFingersLengthWhenThePlanDropsAnObject) {
-  planner.predicts_grasp = false;
+  planner.predicts_goal = false;
   planner.change = [this](Plan& plan, int) { plan.cost = setup.objective.drop; };
   grasp_after(2);
   (void)outcome();
@@ -361,7 +361,7 @@ TEST_F(OnlineReplanning, DoesNotReplanWhenTheDeviationStaysBelowTheThreshold) {
 }
 
 TEST_F(OnlineReplanning, WarmStartsWithTheRestOfThePlanAndOneStraightStep) {
-  planner.predicts_grasp = false;
+  planner.predicts_goal = false;
   planner.change = [](Plan& plan, int) {
     for (int t = 0; t < plan.controls.steps(); ++t) plan.controls.step(t)[kControlRotation] = 0.01 * (t + 1);
   };
@@ -377,7 +377,7 @@ TEST_F(OnlineReplanning, WarmStartsWithTheRestOfThePlanAndOneStraightStep) {
 }
 
 TEST_F(OnlineReplanning, AddsAStraightStepAtStraightSpeedTowardsTheTarget) {
-  planner.predicts_grasp = false;
+  planner.predicts_goal = false;
   // A plan that leads nowhere: predicted and observed hand stay where they are.
   planner.change = [this](Plan& plan, int) {
     std::fill(plan.controls.values.begin(), plan.controls.values.end(), 0.0);

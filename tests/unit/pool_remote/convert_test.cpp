@@ -34,7 +34,7 @@ RolloutBatch odd_batch() {
                      .disturbance_rotation = 5, .edge = 6, .edge_rate = 7, .edge_exponent_max = 8,
                      .edge_margin = 9, .topple = 10, .topple_angle = 11, .drop = 12,
                      .drop_height = 13, .obstruction = 15, .obstacle_target = 16, .obstacle_pusher = 17, .obstacle_nearest = 18,
-                     .intrusion = 19, .success_cost = 14};
+                     .collision = 20, .intrusion = 19, .success_cost = 14};
   batch.incumbent = 0.1;
   batch.stop_losers = false;
   batch.stop_hopeless = true;

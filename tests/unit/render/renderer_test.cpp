@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "physics_pool/scene/generate.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -38,6 +41,28 @@ TEST(Renderer, ShowsTheTargetInGreenFromAbove) {
   // About 40 mm of a 600 mm table that is 80 pixels wide: some 5 x 5 pixels.
   EXPECT_GT(count_green(*picture), 8);
   EXPECT_LT(count_green(*picture), 100);
+}
+
+// Seen straight from above a disc is where its centre is.
+TEST(Renderer, ShowsGoalRegionAndObstacleOfAPush) {
+  const Scene scene = tests::push_around();  // goal at x = 0.2 m, obstacle at the origin
+
+  const auto picture = render(scene, initial_state(scene), {.width = 160, .height = 120, .camera = "top"});
+
+  ASSERT_TRUE(picture) << picture.error().message;
+  const auto obstacle = picture->pixel(80, 60);
+  for (const int part : obstacle) EXPECT_LT(part, 80);
+  int red = 0, mean_x = 0;
+  for (int y = 0; y < picture->height; ++y) {
+    for (int x = 0; x < picture->width; ++x) {
+      const auto colour = picture->pixel(x, y);
+      if (colour[0] < 100 || colour[0] < 2 * colour[1]) continue;
+      ++red;
+      mean_x += x;
+    }
+  }
+  ASSERT_GT(red, 20);
+  EXPECT_NEAR(mean_x / double(red), 80 + 0.2 * 120 / (2 * 1.3 * std::tan(20 * std::numbers::pi / 180)), 2.0);
 }
 
 TEST(Renderer, HasManyColoursInTheOverview) {

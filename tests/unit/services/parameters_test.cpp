@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -42,14 +43,15 @@ TEST(Parameters, TakeEveryKey) {
   const Parameters sut = parsed(R"(
 step_duration: 0.5
 min_steps: 4
-planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], scales: [0.5, 2], update: cost-weighted, lambda: 9, stop_losers: false,
+planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], scales: [0.5, 2], update: cost-weighted, lambda: 9, persistence: 0.9, stop_losers: false,
           stop_hopeless: true, freeze: true, screening: 32, screening_time_step: 0.005}
 objective: {goal: 10, angle: 11, acceleration: 12, disturbance: 13, disturbance_rotation: 14, edge: 15, edge_rate: 16,
             edge_exponent_max: 17, edge_margin: 18, topple: 19, topple_angle: 20, drop: 21, drop_height: 22, success_cost: 23, obstruction: 24,
-            obstacle_target: 25, obstacle_pusher: 26, obstacle_nearest: 27, intrusion: 28}
+            obstacle_target: 25, obstacle_pusher: 26, obstacle_nearest: 27, intrusion: 28, collision: 29}
 control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, initial_steps: 27, straight_speed: 0.28,
           few_iterations_max: 30, obstruction_patience: 31,
           timeout: 29.5, close_hand: false}
+mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straight_speed: 0.36}
 )");
   EXPECT_EQ(sut.planner.step_duration, 0.5);
   EXPECT_EQ(sut.control.step_duration, 0.5);
@@ -61,6 +63,7 @@ control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, init
   EXPECT_THAT(sut.planner.scales, testing::ElementsAre(0.5, 2));
   EXPECT_EQ(sut.planner.update, planners::PbstoOptions::Update::kCostWeighted);
   EXPECT_EQ(sut.planner.lambda, 9);
+  EXPECT_EQ(sut.planner.persistence, 0.9);
   EXPECT_FALSE(sut.planner.stop_losers);
   EXPECT_TRUE(sut.planner.stop_hopeless);
   EXPECT_TRUE(sut.planner.freeze);
@@ -70,8 +73,8 @@ control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, init
   EXPECT_THAT((std::vector{o.goal, o.angle, o.acceleration, o.disturbance, o.disturbance_rotation, o.edge,
                            o.edge_rate, o.edge_exponent_max, o.edge_margin, o.topple, o.topple_angle, o.drop,
                            o.drop_height, o.success_cost, o.obstruction, o.obstacle_target, o.obstacle_pusher,
-                           o.obstacle_nearest, o.intrusion}),
-              testing::ElementsAre(10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28));
+                           o.obstacle_nearest, o.intrusion, o.collision}),
+              testing::ElementsAre(10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29));
   EXPECT_EQ(sut.control.many_iterations, 24);
   EXPECT_EQ(sut.control.few_iterations, 25);
   EXPECT_EQ(sut.control.deviation_threshold, 26);
@@ -81,6 +84,36 @@ control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, init
   EXPECT_EQ(sut.control.obstruction_patience, 31);
   EXPECT_EQ(sut.control.timeout, std::chrono::milliseconds(29500));
   EXPECT_FALSE(sut.control.close_hand);
+  EXPECT_EQ(sut.mpc.horizon, 32);
+  EXPECT_EQ(sut.mpc.first_iterations, 33);
+  EXPECT_EQ(sut.mpc.iterations, 34);
+  EXPECT_EQ(sut.mpc.max_actions, 35);
+  EXPECT_EQ(sut.mpc.straight_speed, 0.36);
+  EXPECT_EQ(sut.mpc.step_duration, 0.5);
+  EXPECT_EQ(sut.mpc.timeout, std::chrono::milliseconds(29500));
+}
+
+// experiments/pushing.yaml says what the code's defaults of pushing are.
+TEST(Parameters, OfPushingAreThoseOfTheCode) {
+  const auto result = load_parameters(std::filesystem::path(JOSTLE_SOURCE_DIR) / "experiments/pushing.yaml");
+  ASSERT_TRUE(result) << result.error().message;
+  const planners::PbstoOptions &got = result->planner, wanted = planners::push_planner_options();
+  EXPECT_EQ(got.rollouts, wanted.rollouts);
+  EXPECT_EQ(got.sigma, wanted.sigma);
+  EXPECT_EQ(got.limit, wanted.limit);
+  EXPECT_EQ(got.scales, wanted.scales);
+  EXPECT_EQ(got.persistence, wanted.persistence);
+  EXPECT_EQ(got.update, wanted.update);
+  EXPECT_EQ(got.min_steps, wanted.min_steps);
+  EXPECT_EQ(got.step_duration, wanted.step_duration);
+  EXPECT_EQ(std::memcmp(&got.objective, &wanted.objective, sizeof wanted.objective), 0);
+  const planners::MpcOptions &mpc = result->mpc, defaults;
+  EXPECT_EQ(mpc.horizon, defaults.horizon);
+  EXPECT_EQ(mpc.first_iterations, defaults.first_iterations);
+  EXPECT_EQ(mpc.iterations, defaults.iterations);
+  EXPECT_EQ(mpc.max_actions, defaults.max_actions);
+  EXPECT_EQ(mpc.straight_speed, defaults.straight_speed);
+  EXPECT_EQ(mpc.timeout, defaults.timeout);
 }
 
 struct Case {
@@ -111,6 +144,9 @@ const std::vector<Case> kCases{
     {"WrongType", "planner:\n  rollouts: many\n", {"p.yaml:2", "planner.rollouts", "'many'", "a whole number"}},
     {"ThreeSigmas", "planner: {sigma: [1, 2, 3]}\n", {"p.yaml", "planner.sigma", "got 3 numbers", "4 for a gripper or 2 for a pusher"}},
     {"LimitsOfAnotherRobot", "planner: {sigma: [1, 2]}\n", {"p.yaml", "planner.limit", "got 4 numbers", "of sigma and limit alike"}},
+    {"NoHorizon", "mpc: {horizon: 0}\n", {"p.yaml", "mpc.horizon", "got 0", "1 to"}},
+    {"NoActions", "mpc: {max_actions: 0}\n", {"p.yaml", "mpc.max_actions", "got 0", "1 to"}},
+    {"UnknownMpcKey", "mpc: {steps: 3}\n", {"p.yaml:1", "mpc.steps", "unknown key", "horizon"}},
     {"NaNTimeout", "control: {timeout: .nan}\n", {"p.yaml", "control.timeout", "nan", "1 to"}},
     {"NoSteps", "control: {initial_steps: 0}\n", {"p.yaml", "control.initial_steps", "got 0", "1 to"}},
     {"NoRollouts", "planner: {rollouts: 0}\n", {"p.yaml", "planner.rollouts", "got 0", "1 to"}},

@@ -1,0 +1,131 @@
+#include "planners/execution/execution.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace jostle::planners {
+
+Execution::Execution(const ControlSetup& setup, double step_duration, std::chrono::milliseconds timeout,
+                     const OnEvent& on_event, std::stop_token stop)
+    : setup_(setup),
+      step_duration_(step_duration),
+      on_event_(on_event),
+      stop_(std::move(stop)),
+      start_(Clock::now()),
+      deadline_(start_ + timeout) {}
+
+Result<void> Execution::observe() {
+  auto robot_result = setup_.robot.read();
+  if (!robot_result) return robot_result.error();
+  auto objects_result = setup_.objects.read();
+  if (!objects_result) return objects_result.error();
+  auto state_result = assemble_state(layout(), *robot_result, *objects_result);
+  if (!state_result) return state_result.error();
+  reading_ = std::move(robot_result).value();
+  x_ = std::move(state_result).value();
+  outcome_.observed.push_back(x_);
+  outcome_.dropped.clear();
+  for (const int i : physics_pool::dropped_objects(setup_.geometry, x_, setup_.objective.drop_height)) {
+    outcome_.dropped.push_back(layout().objects[static_cast<std::size_t>(i)].name);
+  }
+  return {};
+}
+
+Result<void> Execution::plan(const ControlSequence& initial, int iterations, bool clear_hand,
+                             std::vector<double> u_before) {
+  notify(Phase::kPlanning);
+  const auto before = Clock::now();
+  Problem problem{.world = setup_.world,
+                  .x0 = setup_.make_feasible ? setup_.make_feasible(x_) : x_,
+                  .initial = initial,
+                  .u_before = std::move(u_before),
+                  .iterations = iterations,
+                  .seed = setup_.seed,
+                  .stream = stream_,
+                  .clear_hand = clear_hand};
+  auto plan_result = setup_.planner.plan(problem, deadline_, stop_);
+  if (!plan_result) return plan_result.error();
+  plan_ = std::move(plan_result).value();
+  acted_at_plan_ = outcome_.actions;
+  stream_ += static_cast<std::uint32_t>(iterations);
+  outcome_.rollouts += plan_.rollouts;
+  outcome_.iterations += plan_.iterations;
+  outcome_.planning_time += Clock::now() - before;
+  if (!planned_) {
+    planned_ = true;
+    outcome_.first_plan = plan_;
+    outcome_.plan_time = outcome_.planning_time;
+  }
+  return {};
+}
+
+Result<void> Execution::act() {
+  notify(Phase::kActing);
+  if (Clock::now() >= deadline_) return Error{Code::kDeadline, "task: out of time"};
+  if (auto ok = setup_.robot.execute(plan_.controls.step(0), step_duration_, stop_); !ok) return ok;
+  ++outcome_.actions;
+  plan_.controls.drop_first();
+  plan_.states.erase(plan_.states.begin());
+  return observe();
+}
+
+Result<void> Execution::move(std::span<const double> u, Phase phase) {
+  notify(phase);
+  if (auto ok = setup_.robot.execute(u, step_duration_, stop_); !ok) return ok;
+  return observe();
+}
+
+Result<Outcome> Execution::end(const Result<void>& ended) {
+  outcome_.total_time = Clock::now() - start_;
+  if (!ended) {
+    if (ended.error().code != Code::kDeadline) return ended.error();
+    outcome_.reason = fmt::format("timeout after {:.0f} s", outcome_.total_time.count());
+  }
+  notify(Phase::kDone);
+  return std::move(outcome_);
+}
+
+void Execution::notify(Phase phase) const {
+  if (!on_event_) return;
+  on_event_({.phase = phase,
+             .actions = outcome_.actions,
+             .replans = outcome_.replans,
+             .plan = planned_ ? &plan_ : nullptr,
+             .observed = &x_});
+}
+
+Result<State> assemble_state(const StateLayout& layout, const robot_bridge::RobotReading& robot,
+                             const std::vector<perception::ObjectReading>& objects) {
+  if (robot.q.size() != layout.joints.size() || robot.v.size() != layout.joints.size()) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("robot: got {} positions and {} velocities, wanted {} joints",
+                             robot.q.size(), robot.v.size(), layout.joints.size())};
+  }
+  State x;
+  x.q = robot.q;
+  x.v = robot.v;
+  for (const ObjectSlot& slot : layout.objects) {
+    const auto found = std::ranges::find(objects, slot.name, &perception::ObjectReading::name);
+    if (found == objects.end()) {
+      return Error{Code::kInvalidArgument,
+                   fmt::format("objects: no measurement of '{}', wanted all {} objects of the scene",
+                               slot.name, layout.objects.size())};
+    }
+    x.q.insert(x.q.end(), found->position.begin(), found->position.end());
+    x.q.insert(x.q.end(), found->orientation.begin(), found->orientation.end());
+    x.v.insert(x.v.end(), found->linear.begin(), found->linear.end());
+    x.v.insert(x.v.end(), found->angular.begin(), found->angular.end());
+  }
+  return x;
+}
+
+std::string names_of(const StateLayout& layout, const std::vector<int>& objects) {
+  std::string names;
+  for (const int i : objects) {
+    names += (names.empty() ? "" : ", ") + layout.objects[static_cast<std::size_t>(i)].name;
+  }
+  return names;
+}
+
+}  // namespace jostle::planners

@@ -1,0 +1,127 @@
+#pragma once
+/// \file
+/// What every controller does alike: observe, plan, act, tell, keep count.
+
+#include <chrono>
+#include <functional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "idl/types/result.hpp"
+#include "idl/types/state.hpp"
+#include "perception/api/object_source.hpp"
+#include "physics_pool/objective/terms.hpp"
+#include "planners/api/planner.hpp"
+#include "robot_bridge/api/robot.hpp"
+
+namespace jostle::planners {
+
+/// What a controller works with. Everything outlives the run.
+struct ControlSetup {
+  Planner& planner;
+  robot_bridge::Robot& robot;
+  perception::ObjectSource& objects;
+  const physics_pool::TaskGeometry& geometry;
+  physics_pool::Objective objective;
+  Hash world;
+  std::uint64_t seed = 0;
+  /// Makes an observed state one that physics can start from; may be empty.
+  std::function<State(const State&)> make_feasible;
+};
+
+/// Phases of a run, for those who watch.
+enum class Phase { kPlanning, kActing, kClosing, kDone };
+
+/// A running controller's news; valid during the call.
+struct ControlEvent {
+  Phase phase = Phase::kPlanning;
+  int actions = 0;
+  int replans = 0;
+  const Plan* plan = nullptr;      ///< the present plan, once there is one
+  const State* observed = nullptr; ///< newest observation
+};
+using OnEvent = std::function<void(const ControlEvent&)>;
+
+struct Outcome {
+  bool success = false;
+  std::string reason;           ///< one sentence
+  Plan first_plan;
+  int replans = 0;
+  int actions = 0;
+  std::uint64_t rollouts = 0;   ///< over all plans
+  int iterations = 0;           ///< over all plans
+  std::chrono::duration<double> plan_time{};      ///< of the first plan
+  std::chrono::duration<double> planning_time{};  ///< of all plans
+  std::chrono::duration<double> total_time{};
+  Trajectory observed;          ///< before the first action and after each
+  std::vector<std::string> dropped;
+};
+
+/// One run of a controller under way: the newest state, the present plan, and what
+/// has come of it so far.
+///
+/// Threads  one.
+/// Time     kDeadline once the run has taken longer than its time.
+class Execution {
+ public:
+  Execution(const ControlSetup& setup, double step_duration, std::chrono::milliseconds timeout,
+            const OnEvent& on_event, std::stop_token stop);
+
+  const StateLayout& layout() const { return setup_.geometry.layout; }
+  const State& x() const { return x_; }                                   ///< newest observation
+  const robot_bridge::RobotReading& robot() const { return reading_; }  ///< of the same moment
+  Outcome& outcome() { return outcome_; }
+  const Outcome& outcome() const { return outcome_; }
+
+  /// The present plan: what is left of it, from the newest state on.
+  Plan& plan() { return plan_; }
+  const Plan& plan() const { return plan_; }
+  bool has_planned() const { return planned_; }
+  /// Whether nothing of the present plan has been executed.
+  bool plan_is_fresh() const { return outcome_.actions == acted_at_plan_; }
+
+  Result<void> observe();
+
+  /// Plans from x(), with fresh noise.
+  Result<void> plan(const ControlSequence& initial, int iterations, bool clear_hand = false,
+                    std::vector<double> u_before = {});
+
+  /// Executes u_0, removes it and x_0 from the plan, observes.
+  Result<void> act();
+
+  /// Applies u, which is of no plan, and observes.
+  Result<void> move(std::span<const double> u, Phase phase);
+
+  /// Ends the run. A task that ran out of time has failed, the system has not.
+  Result<Outcome> end(const Result<void>& ended);
+
+  void notify(Phase phase) const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  const ControlSetup& setup_;
+  const double step_duration_;  // s
+  const OnEvent& on_event_;
+  const std::stop_token stop_;
+  const Clock::time_point start_, deadline_;
+  State x_;
+  robot_bridge::RobotReading reading_;
+  Plan plan_;
+  bool planned_ = false;
+  std::uint32_t stream_ = 0;
+  int acted_at_plan_ = -1;  // actions executed when the present plan was made
+  Outcome outcome_;
+};
+
+/// A State from the two ports' readings.
+/// Error kInvalidArgument if an object of the layout is missing; names it.
+Result<State> assemble_state(const StateLayout& layout, const robot_bridge::RobotReading& robot,
+                             const std::vector<perception::ObjectReading>& objects);
+
+/// Names of objects by index, "a, b".
+std::string names_of(const StateLayout& layout, const std::vector<int>& objects);
+
+}  // namespace jostle::planners

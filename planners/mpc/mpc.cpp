@@ -1,0 +1,160 @@
+#include "planners/mpc/mpc.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace jostle::planners {
+namespace {
+
+constexpr double kLost = 0.001;    // m; a plan that moves the target less does not push it
+constexpr double kClearance = 0.01;  // m between target and a pusher that goes round it
+constexpr double kBehind = 0.8;    // rad; further off the line of a push the pusher slips off
+
+struct Point {
+  double x = 0.0, y = 0.0;  // m
+};
+
+Point target_in(const physics_pool::TaskGeometry& geometry, const State& x) {
+  const auto target = static_cast<std::size_t>(geometry.layout.target);
+  const auto q = static_cast<std::size_t>(geometry.layout.objects[target].q);
+  return {x.q[q], x.q[q + 1]};
+}
+
+class Run {
+ public:
+  Run(const ControlSetup& setup, const MpcOptions& options, const OnEvent& on_event, std::stop_token stop)
+      : setup_(setup),
+        options_(options),
+        execution_(setup, options.step_duration, options.timeout, on_event, std::move(stop)) {}
+
+  Result<Outcome> go() { return execution_.end(push()); }
+
+ private:
+  Result<void> push() {
+    if (auto ok = execution_.observe(); !ok) return ok;
+    for (ControlSequence initial = straight(x(), options_.horizon); !is_over();) {
+      const bool first = !execution_.has_planned();
+      if (!first) ++execution_.outcome().replans;
+      const int iterations = first ? options_.first_iterations : options_.iterations;
+      if (auto ok = execution_.plan(initial, iterations, false, u_before_); !ok) return ok;
+      if (options_.plan_only) return conclude_plan();
+      const auto u = execution_.plan().controls.step(0);
+      u_before_.assign(u.begin(), u.end());
+      if (auto ok = execution_.act(); !ok) return ok;
+      initial = warm_start();
+    }
+    return {};
+  }
+
+  // What is left of the plan, filled up to the horizon. A plan that has lost the target
+  // does not find it again by small changes: then a straight push, from where it is.
+  ControlSequence warm_start() const {
+    const Plan& plan = execution_.plan();
+    if (way_of_target(plan.states) < kLost) return straight(x(), options_.horizon);
+    ControlSequence controls = plan.controls;
+    if (const int missing = options_.horizon - controls.steps(); missing > 0) {
+      controls.append(straight(plan.states.back(), missing).values);
+    }
+    return controls;
+  }
+
+  // From first to last, m.
+  double way_of_target(const Trajectory& states) const {
+    const Point from = target_in(setup_.geometry, states.front()), to = target_in(setup_.geometry, states.back());
+    return std::hypot(to.x - from.x, to.y - from.y);
+  }
+
+  ControlSequence straight(const State& from, int steps) const {
+    return straight_push(setup_.geometry, from, steps, options_.step_duration, options_.straight_speed);
+  }
+
+  bool is_over() {
+    Outcome& outcome = execution_.outcome();
+    const physics_pool::TaskGeometry& geometry = setup_.geometry;
+    if (!outcome.dropped.empty()) {
+      outcome.reason = fmt::format("dropped {}", fmt::join(outcome.dropped, ", "));
+    } else if (physics_pool::target_hits_obstacle(geometry, x())) {
+      outcome.reason = "target hit the obstacle";
+    } else if (physics_pool::pusher_hits_obstacle(geometry, x())) {
+      outcome.reason = "pusher hit the obstacle";
+    } else if (const auto inside = physics_pool::intruders(geometry, x()); !inside.empty()) {
+      outcome.reason = fmt::format("{} in the goal region", names_of(execution_.layout(), inside));
+    } else if (physics_pool::at_goal(geometry, x(), setup_.objective)) {
+      outcome.success = true;
+      outcome.reason = "target in the goal region";
+    } else if (outcome.actions >= options_.max_actions) {
+      outcome.reason = fmt::format("not in the goal region after {} actions", outcome.actions);
+    }
+    return !outcome.reason.empty();
+  }
+
+  Result<void> conclude_plan() {
+    Outcome& outcome = execution_.outcome();
+    outcome.success = execution_.plan().at_goal;
+    outcome.reason = outcome.success ? "plan reaches the goal region; not executed"
+                                     : "plan does not reach the goal region; not executed";
+    return {};
+  }
+
+  const State& x() const { return execution_.x(); }
+
+  const ControlSetup& setup_;
+  const MpcOptions& options_;
+  Execution execution_;
+  std::vector<double> u_before_;  // [nu] the newest executed control; empty before the first
+};
+
+}  // namespace
+
+Result<Outcome> run_mpc(const ControlSetup& setup, const MpcOptions& options, const OnEvent& on_event,
+                        std::stop_token stop) {
+  return Run(setup, options, on_event, std::move(stop)).go();
+}
+
+ControlSequence straight_push(const physics_pool::TaskGeometry& geometry, const State& x, int steps,
+                              double step_duration, double speed) {
+  const physics_pool::SceneObject& shape = geometry.target;
+  const double radius = shape.shape == physics_pool::Shape::kBox ? std::hypot(shape.size[0], shape.size[1]) / 2 : shape.radius;
+  const double reach = radius + geometry.pusher_radius + kClearance;
+  const double stride = speed * step_duration;
+  Point target = target_in(geometry, x), pusher{x.q[kJointX], x.q[kJointY]};
+  ControlSequence controls{.nu = kPusherAxes};
+  for (int t = 0; t < steps; ++t) {
+    const double dx = geometry.task.goal.x - target.x, dy = geometry.task.goal.y - target.y;
+    const double way = std::hypot(dx, dy), push = std::atan2(dy, dx);
+    // Where the pusher is as seen from the target: 0 straight behind it.
+    const double around = std::remainder(std::atan2(target.y - pusher.y, target.x - pusher.x) - push, 2 * std::numbers::pi);
+    Point step;
+    if (std::abs(around) <= kBehind) {
+      const double length = std::min(stride, way / (steps - t));
+      step = {length * std::cos(push), length * std::sin(push)};
+      target = {target.x + step.x, target.y + step.y};
+    } else {
+      const double angle = push + around - std::copysign(std::min(std::abs(around), stride / reach), around);
+      const Point to{target.x - reach * std::cos(angle), target.y - reach * std::sin(angle)};
+      const double far = std::hypot(to.x - pusher.x, to.y - pusher.y);
+      const double share = far > stride ? stride / far : 1.0;
+      step = {share * (to.x - pusher.x), share * (to.y - pusher.y)};
+    }
+    pusher = {pusher.x + step.x, pusher.y + step.y};
+    controls.append(std::array{step.x / step_duration, step.y / step_duration});
+  }
+  return controls;
+}
+
+PbstoOptions push_planner_options() {
+  PbstoOptions options;
+  options.rollouts = 20;
+  options.sigma = {0.01, 0.01};
+  options.limit = {0.1, 0.1};
+  options.scales = {1.0, 2.0, 4.0, 0.5};
+  options.min_steps = 0;
+  options.objective.success_cost = 10000.0;
+  return options;
+}
+
+}  // namespace jostle::planners

@@ -20,7 +20,7 @@ struct RobotReading {
   std::optional<bool> object_in_hand;
 };
 
-/// A velocity-controlled planar gripper, real or simulated.
+/// A velocity-controlled planar gripper or pusher, real or simulated.
 ///
 /// Threads  one caller at a time.
 /// Failure  the robot is stopped first, then the error is reported.
@@ -35,8 +35,8 @@ class Robot {
   /// last executed control.
   virtual Result<RobotReading> read() = 0;
 
-  /// Applies u (x, y [m/s], rotation [rad/s], opening [m/s]) for `duration`
-  /// seconds and returns when that time is over.
+  /// Applies u (x, y [m/s]; of a gripper also rotation [rad/s], opening [m/s]) for
+  /// `duration` seconds and returns when that time is over.
   virtual Result<void> execute(std::span<const double> u, double duration,
                                std::stop_token stop = {}) = 0;
 };

@@ -94,6 +94,10 @@ Result<void> show(const Arguments& arguments) {
              scene.surface.kind == physics_pool::Surface::Kind::kTable ? "table" : "shelf",
              scene.surface.size[0], scene.surface.size[1], scene.robot.model, scene.robot.x,
              scene.robot.y, scene.physics.time_step, scene.task.kind, scene.task.target);
+  const auto show_disc = [](const char* name, const physics_pool::Disc& disc) {
+    fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", name, "disc", fmt::format("r {:.1f}", 1e3 * disc.radius), "",
+               "", disc.x, disc.y);
+  };
   fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8} {:>8} {:>8}\n", "name", "shape", "size mm", "mass kg",
              "friction", "x m", "y m", "yaw rad");
   for (const SceneObject& object : scene.objects) {
@@ -101,6 +105,8 @@ Result<void> show(const Arguments& arguments) {
                object.shape == physics_pool::Shape::kBox ? "box" : "cylinder", size_text(object),
                object.mass, object.friction, object.x, object.y, object.yaw);
   }
+  if (scene.task.is_push()) show_disc("(goal)", scene.task.goal);
+  if (scene.task.obstacle) show_disc("(obstacle)", *scene.task.obstacle);
   return {};
 }
 

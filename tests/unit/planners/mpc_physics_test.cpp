@@ -49,7 +49,7 @@ TEST(MpcPhysics, PushesStraightAheadWithoutAnObstacle) {
 TEST(MpcPhysics, GoesRoundTheObstacle) {
   Scene scene = std::move(generate_chapter6({.seed = 101})).value();
   scene.physics.time_step = 0.002;
-  const Outcome outcome = pushed(scene, {.first_iterations = 4, .iterations = 2});
+  const Outcome outcome = pushed(scene, {});
   EXPECT_TRUE(outcome.success) << outcome.reason;
   const TaskGeometry geometry(scene);
   for (const State& x : outcome.observed) {

@@ -35,6 +35,18 @@ TEST_F(InProcessWorld, RobotFeelsTheTargetInTheHand) {
   EXPECT_EQ(sut.read()->object_in_hand, std::optional(true));
 }
 
+TEST(InProcessPush, PusherHasTwoJointsAndFeelsNothing) {
+  const physics_pool::Scene scene = tests::push_ahead();
+  physics_pool::ExecutionWorld execution(std::move(physics_pool::World::compile(scene)).value(), 0.0, 1);
+  SimulatedRobot sut(execution);
+  const auto reading = sut.read();
+  ASSERT_TRUE(reading);
+  EXPECT_THAT(reading->q, testing::ElementsAre(scene.robot.x, scene.robot.y));
+  EXPECT_EQ(reading->object_in_hand, std::nullopt);
+  EXPECT_FALSE(sut.execute(std::vector{0.1, 0.0, 0.0, 0.0}, 0.1, {}));
+  EXPECT_TRUE(sut.execute(std::vector{0.1, 0.0}, 0.1, {}));
+}
+
 TEST_F(InProcessWorld, RobotExecutesLikeThePlannersModel) {
   SimulatedRobot sut(execution);
   const std::vector<double> u{0.1, 0.05, 0.2, -0.01};

@@ -107,7 +107,7 @@ Examples examples_of(const TransitionFile& data, Part part, double held_out, con
     examples.inputs.insert(examples.inputs.end(), inputs.begin(), inputs.end());
     examples.targets.insert(examples.targets.end(), targets.begin(), targets.end());
     for (int slot = 0; slot < kSlots; ++slot) {
-      const auto place = slot < view.slots() ? view.position(slot) : parking[static_cast<std::size_t>(slot)];
+      const auto place = slot < view.slots() ? view.guess(slot) : parking[static_cast<std::size_t>(slot)];
       for (const double p : place) examples.places.push_back(static_cast<float>(p));
     }
     for (const double p : view.pusher_end()) examples.places.push_back(static_cast<float>(p));

@@ -15,7 +15,7 @@ namespace jostle::services {
 struct Examples {
   std::vector<float> inputs;   ///< [N][kInputs], SI
   std::vector<float> targets;  ///< [N][kOutputs], SI
-  /// [N][2·kSlots + 3] for penetration: positions of the slots before, m, pusher's end, slots used.
+  /// [N][2·kSlots + 3] for penetration: where the slots end by guess, m, pusher's end, slots used.
   std::vector<float> places;
   static constexpr int kPlaces = 2 * physics_pool::kSlots + 3;
 

@@ -22,7 +22,7 @@ using physics_pool::Network;
 using physics_pool::NetworkLayer;
 
 constexpr std::array kWidths{kInputs, 512, 256, 128, 64, kOutputs};  // Sec. 7.2.1.1
-constexpr float kPositionUnit = 0.02f;       // m; what an error of one unit is
+constexpr float kPositionUnit = 0.01f;       // m; what an error of one unit is
 constexpr float kAngleUnit = 0.4f;           // rad; cylinders look the same from all sides
 constexpr float kVelocityUnit = 2.0f;        // shares of the pusher's speed; forgotten within millimetres
 constexpr float kTolerance = 5e-4f;          // m, of penetration
@@ -73,8 +73,8 @@ torch::Tensor loss(const torch::Tensor& answers, const Tensors& batch, const Geo
   torch::Tensor total = (answers - batch.targets).square().sum(1);
   if (weight > 0) {
     const torch::Tensor change = answers.view({-1, kSlots, kSlotOutputs}).narrow(2, 0, 2) * kPositionUnit;
-    const torch::Tensor before = batch.places.narrow(1, 0, 2 * kSlots).view({-1, kSlots, 2});
-    const torch::Tensor after = before + change;
+    const torch::Tensor guess = batch.places.narrow(1, 0, 2 * kSlots).view({-1, kSlots, 2});
+    const torch::Tensor after = guess + change;
     const torch::Tensor pusher = batch.places.narrow(1, 2 * kSlots, 2).unsqueeze(1);
     const auto depth = [](const torch::Tensor& apart, float reach) {
       return ((apart.square().sum(-1) + 1e-12).sqrt() - reach).clamp_max(0) / kPositionUnit;

@@ -20,6 +20,26 @@ double segment_distance(double x, double y, double ax, double ay, double bx, dou
   return std::hypot(x - ax - along * dx, y - ay - along * dy);
 }
 
+// Which way a slider goes that is pushed along n by what moves along a hint. Friction
+// with the surface is a pyramid: a force between two axes moves things along the
+// diagonal, one along an axis anywhere within 45 degrees of it. In between a contact's
+// own friction decides. The constants are a rough fit to the fine model; the
+// network knows better.
+std::array<double, 2> escape(double nx, double ny, double hint_x, double hint_y) {
+  constexpr double kQuarter = std::numbers::pi / 4;
+  constexpr double kBlur = 0.07;   // rad from an axis at which the way is half a diagonal's
+  constexpr double kCone = 0.35;   // rad from an axis within which contact friction matters
+  const double normal = std::atan2(ny, nx);
+  const double axis = 2 * kQuarter * std::round(normal / (2 * kQuarter)), off = normal - axis;
+  const double hint = std::remainder(std::atan2(hint_y, hint_x) - axis, 2 * std::numbers::pi);
+  const bool is_along = off * hint > 0;
+  const double y = std::abs(off) / (kBlur * (is_along ? std::clamp(1 - std::abs(hint) / 1.2, 0.15, 1.0) : 1.0));
+  const double z = y * (1 + y / 12);
+  double way = std::copysign(kQuarter * z / (1 + z), off);
+  if (!is_along && std::abs(off) < kCone) way *= std::clamp(1.1 - std::abs(hint), 0.1, 1.0);
+  return {std::cos(axis + way), std::sin(axis + way)};
+}
+
 double wrapped(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
 
 }  // namespace
@@ -106,7 +126,6 @@ void PushView::fill_slots(int first) {
       }
     }
   }
-  key[at(first)] = -1.0;
   for (int i = 0; i < sliders_; ++i) {
     if (!in_reach[at(i)]) continue;
     int slot = slots_++;
@@ -118,6 +137,42 @@ void PushView::fill_slots(int first) {
     for (int slot = 0; slot < slots_; ++slot) values[at(slot)] = old[at(slider_[at(slot)])];
   };
   for (auto* values : {&x_, &y_, &vx_, &vy_, &omega_}) sort(*values);
+  guess_ways();
+}
+
+// Pushes in small parts: whoever overlaps is moved out along escape().
+void PushView::guess_ways() {
+  constexpr int kParts = 32;
+  std::array<double, kSlots> x = x_, y = y_;
+  // Moves slot j out of something at (px, py) that comes along (hint_x, hint_y).
+  const auto push = [&](double px, double py, double reach, double hint_x, double hint_y, int j) {
+    const double nx = x[at(j)] - px, ny = y[at(j)] - py, apart = std::hypot(nx, ny);
+    if (!(apart < reach) || apart == 0) return;
+    const auto way = escape(nx / apart, ny / apart, hint_x, hint_y);
+    const double length = (reach - apart) / (way[0] * nx + way[1] * ny) * apart;
+    x[at(j)] += length * way[0];
+    y[at(j)] += length * way[1];
+  };
+  for (int part = 1; part <= kParts; ++part) {
+    const double along = way_ * part / kParts;
+    const std::array<double, kSlots> old_x = x, old_y = y;
+    for (int i = 0; i < slots_; ++i) push(along * cos_, along * sin_, bodies_.pusher_reach(), cos_, sin_, i);
+    for (int round = 1; round < slots_; ++round) {
+      for (int i = 0; i < slots_; ++i) {
+        const double dx = x[at(i)] - old_x[at(i)], dy = y[at(i)] - old_y[at(i)], moved = std::hypot(dx, dy);
+        if (moved == 0) continue;
+        for (int j = 0; j < slots_; ++j) {
+          // Who moved more pushes who moved less.
+          if (j == i || std::hypot(x[at(j)] - old_x[at(j)], y[at(j)] - old_y[at(j)]) >= moved) continue;
+          push(x[at(i)], y[at(i)], bodies_.slider_reach(), dx / moved, dy / moved, j);
+        }
+      }
+    }
+  }
+  for (int i = 0; i < slots_; ++i) {
+    guess_x_[at(i)] = x[at(i)] - x_[at(i)];
+    guess_y_[at(i)] = y[at(i)] - y_[at(i)];
+  }
 }
 
 void PushView::inputs(const Parking& parking, std::span<float> values) const {
@@ -126,11 +181,12 @@ void PushView::inputs(const Parking& parking, std::span<float> values) const {
   for (int slot = 0; slot < kSlots; ++slot) {
     if (slot >= slots_) {
       const auto [x, y] = parking[at(slot)];
-      for (const double v : {x, y, x, y, 0.0, 0.0, 0.0}) *value++ = static_cast<float>(v);
+      for (const double v : {x, y, x, y, 0.0, 0.0, 0.0, 0.0, 0.0}) *value++ = static_cast<float>(v);
       continue;
     }
     const double x = x_[at(slot)], y = y_[at(slot)];
-    for (const double v : {x, y, cos_ * x + sin_ * y, cos_ * y - sin_ * x, vx_[at(slot)], vy_[at(slot)], omega_[at(slot)]}) {
+    for (const double v : {x, y, cos_ * x + sin_ * y, cos_ * y - sin_ * x, vx_[at(slot)], vy_[at(slot)], omega_[at(slot)],
+                           guess_x_[at(slot)], guess_y_[at(slot)]}) {
       *value++ = static_cast<float>(v);
     }
   }
@@ -148,8 +204,8 @@ void PushView::targets(std::span<const double> before, std::span<const double> a
     // Faster than the pusher is who moved before: of no use for a push.
     const auto share = [&](double speed) { return static_cast<float>(std::clamp(speed / speed_, -kFastest, kFastest)); };
     float* value = values.data() + slot * kSlotOutputs;
-    value[0] = static_cast<float>(step[0]);
-    value[1] = static_cast<float>(step[1]);
+    value[0] = static_cast<float>(step[0] - guess_x_[at(slot)]);
+    value[1] = static_cast<float>(step[1] - guess_y_[at(slot)]);
     value[2] = static_cast<float>(handedness_ * wrapped(pose[2] - old_pose[2]));
     value[3] = share(v[0]);
     value[4] = share(v[1]);
@@ -160,18 +216,16 @@ void PushView::targets(std::span<const double> before, std::span<const double> a
 void PushView::touched(std::span<const float> outputs, std::array<bool, kSlots>& is_touched) const {
   const auto end = pusher_end();
   is_touched = {};
-  if (slots_ > 0) is_touched[0] = true;
-  for (int slot = 1; slot < slots_; ++slot) {
+  for (int slot = 0; slot < slots_; ++slot) {
     is_touched[at(slot)] = segment_distance(x_[at(slot)], y_[at(slot)], 0, 0, end[0], end[1]) < bodies_.pusher_reach() + kTouch;
   }
   for (int round = 1; round < slots_; ++round) {
     for (int i = 0; i < slots_; ++i) {
       const float* moved = outputs.data() + i * kSlotOutputs;
-      for (int j = 1; j < slots_; ++j) {
+      for (int j = 0; j < slots_; ++j) {
         if (!is_touched[at(i)] || is_touched[at(j)]) continue;
-        const double x = x_[at(i)], y = y_[at(i)];
-        is_touched[at(j)] = segment_distance(x_[at(j)], y_[at(j)], x, y, x + moved[0], y + moved[1]) <
-                            bodies_.slider_reach() + kTouch;
+        is_touched[at(j)] = segment_distance(x_[at(j)], y_[at(j)], x_[at(i)], y_[at(i)], guess(i)[0] + moved[0],
+                                             guess(i)[1] + moved[1]) < bodies_.slider_reach() + kTouch;
       }
     }
   }
@@ -186,7 +240,7 @@ void PushView::apply(std::span<const float> outputs, std::span<double> state) co
     const float* change = outputs.data() + slot * kSlotOutputs;
     double* pose = state.data() + layout.pose(slider(slot));
     double* velocity = state.data() + layout.velocity(slider(slot));
-    const auto step = unfold(change[0], change[1]);
+    const auto step = unfold(guess_x_[at(slot)] + change[0], guess_y_[at(slot)] + change[1]);
     const auto v = unfold(speed_ * change[3], speed_ * change[4]);
     pose[0] += step[0];
     pose[1] += step[1];

@@ -12,7 +12,7 @@ namespace jostle::physics_pool {
 
 inline constexpr int kSlots = 4;         ///< N_s, sliders at most
 inline constexpr int kPushInputs = 5;    ///< way ahead (3), heading, speed
-inline constexpr int kSlotInputs = 7;    ///< position in two frames (4), velocity (3)
+inline constexpr int kSlotInputs = 9;    ///< position in two frames (4), velocity (3), rough way (2)
 inline constexpr int kSlotOutputs = 6;   ///< change of pose, velocity
 inline constexpr int kInputs = kPushInputs + kSlots * kSlotInputs;
 inline constexpr int kOutputs = kSlots * kSlotOutputs;
@@ -42,8 +42,8 @@ inline constexpr Parking kParking{{{-0.30, -0.30}, {-0.30, -0.45}, {-0.45, -0.30
 ///          is at an angle in [0, pi/4] from x. The fine model's friction cones are
 ///          pyramids aligned with the world's axes: it has the symmetries of the
 ///          square, and no others.
-/// Slots    the slider that is touched first, then those that it or the pusher could
-///          reach, by their distance from the pusher's way. Others take no part.
+/// Slots    sliders that the pusher, or what it moves, could reach, by their distance
+///          from the pusher's way. Others take no part.
 class PushView {
  public:
   /// `state` as PlanarLayout says; u in m/s.
@@ -58,8 +58,8 @@ class PushView {
   void inputs(const Parking& parking, std::span<float> values) const;
 
   /// What the network should answer, from the states before and after F: [kOutputs], per slot
-  /// change of x, y, theta (m, rad) and the new velocity as a share of the pusher's
-  /// speed (angular: times the slider's radius). Zero for unused slots.
+  /// change of x and y beyond the rough guess (m), of theta (rad), and the new velocity as
+  /// a share of the pusher's speed (angular: times the slider's radius). Zero for unused slots.
   void targets(std::span<const double> before, std::span<const double> after, std::span<float> values) const;
 
   /// Moves pusher and sliders of the `state` it was made from, as the network answers.
@@ -69,14 +69,15 @@ class PushView {
 
   /// Where the pusher's axis ends, in fold's frame, m.
   std::array<double, 2> pusher_end() const { return {way_ * cos_, way_ * sin_}; }
-  /// Of a slot, in fold's frame, m.
-  std::array<double, 2> position(int slot) const { return {x_[at(slot)], y_[at(slot)]}; }
+  /// Where a slot's slider ends by the rough guess, in fold's frame, m.
+  std::array<double, 2> guess(int slot) const { return {x_[at(slot)] + guess_x_[at(slot)], y_[at(slot)] + guess_y_[at(slot)]}; }
 
  private:
   static std::size_t at(int index) { return static_cast<std::size_t>(index); }
   std::array<double, 2> fold(double x, double y) const;
   std::array<double, 2> unfold(double x, double y) const;
   void fill_slots(int first);
+  void guess_ways();
   void touched(std::span<const float> outputs, std::array<bool, kSlots>& touched) const;
 
   PushBodies bodies_;
@@ -90,6 +91,7 @@ class PushView {
   double way_ = 0.0;                     // m, left once a slider is touched
   // In fold's frame: of slider i until slots are filled, of slot i afterwards.
   std::array<double, kSlots> x_{}, y_{}, vx_{}, vy_{}, omega_{};
+  std::array<double, kSlots> guess_x_{}, guess_y_{};  // of slots: rough ways, m
   std::array<int, kSlots> slider_{-1, -1, -1, -1};
   int slots_ = 0;
 };

@@ -27,9 +27,8 @@ constexpr float kAngleUnit = 0.4f;           // rad; cylinders look the same fro
 constexpr float kVelocityUnit = 2.0f;        // shares of the pusher's speed; forgotten within millimetres
 constexpr float kTolerance = 5e-4f;          // m, of penetration
 constexpr std::size_t kFewest = 200;         // transitions that touch something
-constexpr int kPatches = 8192;               // held-out examples judged at a time
+constexpr long kChunk = 8192;                // held-out examples judged at a time
 
-// Plain multiplications by (input, weight) pairs that a file can hold.
 struct Mlp : torch::nn::Module {
   Mlp() {
     for (std::size_t i = 0; i + 1 < kWidths.size(); ++i) {
@@ -132,8 +131,8 @@ double held_out_loss(Mlp& mlp, const Tensors& held_out, const Geometry& geometry
   const torch::NoGradGuard no_gradients;
   const long size = held_out.inputs.size(0);
   double sum = 0.0;
-  for (long first = 0; first < size; first += kPatches) {
-    const long count = std::min<long>(kPatches, size - first);
+  for (long first = 0; first < size; first += kChunk) {
+    const long count = std::min(kChunk, size - first);
     const Tensors part = held_out.at(torch::arange(first, first + count));
     sum += static_cast<double>(count) * loss(mlp.forward(part.inputs), part, geometry, weight).item<double>();
   }

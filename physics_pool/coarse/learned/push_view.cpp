@@ -116,7 +116,7 @@ void PushView::fill_slots(int first) {
     key[at(i)] = segment_distance(x_[at(i)], y_[at(i)], 0, 0, way_ * cos_, way_ * sin_);
     if (key[at(i)] < bodies_.pusher_reach() + kTouch) in_reach[at(i)] = true;
   }
-  // Nothing moves farther than the pusher: the rest is a matter of who could meet whom.
+  // Hardly anything moves farther than the pusher: the rest is a matter of who could meet whom.
   for (int round = 1; round < sliders_; ++round) {
     for (int i = 0; i < sliders_; ++i) {
       for (int j = 0; j < sliders_; ++j) {

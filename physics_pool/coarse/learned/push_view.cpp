@@ -105,7 +105,28 @@ PushView::PushView(const PushBodies& bodies, std::span<const double> state, int 
     y_[at(i)] -= least * sin_;
   }
   way_ -= least;
+  choose_side(first);
   fill_slots(first);
+}
+
+// A push exactly along an axis or a diagonal folds in two ways; the one with the first
+// slider on its left is taken.
+void PushView::choose_side(int first) {
+  if (cos_ * y_[at(first)] - sin_ * x_[at(first)] >= 0) return;
+  if (std::abs(u_[0]) == std::abs(u_[1])) {
+    swap_ = !swap_;
+    std::swap(x_, y_);
+    std::swap(vx_, vy_);
+  } else if (sin_ == 0) {
+    double& sign = swap_ ? sign_x_ : sign_y_;
+    sign = -sign;
+    for (double& y : y_) y = -y;
+    for (double& vy : vy_) vy = -vy;
+  } else {
+    return;
+  }
+  handedness_ = -handedness_;
+  for (double& omega : omega_) omega = -omega;
 }
 
 void PushView::fill_slots(int first) {

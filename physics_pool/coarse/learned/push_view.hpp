@@ -76,6 +76,7 @@ class PushView {
   static std::size_t at(int index) { return static_cast<std::size_t>(index); }
   std::array<double, 2> fold(double x, double y) const;
   std::array<double, 2> unfold(double x, double y) const;
+  void choose_side(int first);
   void fill_slots(int first);
   void guess_ways();
   void touched(std::span<const float> outputs, std::array<bool, kSlots>& touched) const;

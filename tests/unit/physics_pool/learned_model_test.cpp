@@ -93,9 +93,11 @@ TEST_P(LearnedModelSymmetry, OfTheFineModelIsExact) {
   const Motion& motion = GetParam();
   const auto sut = model(4);
   const auto start = state_of(0.0, 0.0, kCrowd);
-  const auto expected = motion.moved(advanced(*sut, start, kAhead));
-  const auto end = advanced(*sut, motion.moved(start), motion.turned(kAhead[0], kAhead[1]));
-  for (std::size_t i = 0; i < end.size(); ++i) EXPECT_NEAR(end[i], expected[i], kSame) << "entry " << i;
+  for (const auto& u : {kAhead, std::array{0.1, 0.0}, std::array{0.07, 0.07}}) {
+    const auto expected = motion.moved(advanced(*sut, start, u));
+    const auto end = advanced(*sut, motion.moved(start), motion.turned(u[0], u[1]));
+    for (std::size_t i = 0; i < end.size(); ++i) EXPECT_NEAR(end[i], expected[i], kSame) << "entry " << i << ", u " << u[1];
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(, LearnedModelSymmetry,

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "physics_pool/coarse/kinematic.hpp"
+#include "physics_pool/coarse/learned/learned_model.hpp"
 #include "physics_pool/coarse/quasi_static.hpp"
 
 namespace jostle::physics_pool {
@@ -16,6 +17,8 @@ Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, 
                  fmt::format("scene '{}': robot.model: got '{}', wanted pusher: coarse models know no other robot",
                              scene.name, scene.robot.model)};
   }
+  constexpr std::string_view kLearned = "learned:";
+  if (name.starts_with(kLearned)) return load_learned_model(name.substr(kLearned.size()), scene);
   std::unique_ptr<CoarseModel> model;
   if (name == "kinematic") model = std::make_unique<KinematicModel>(scene);
   if (name == "limit-surface") {
@@ -24,7 +27,7 @@ Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, 
   if (name == "planar") model = std::make_unique<QuasiStaticModel>(scene, QuasiStaticOptions{});
   if (model) return model;
   return Error{Code::kInvalidArgument,
-               fmt::format("coarse model: got '{}', wanted kinematic, limit-surface, planar, learned or learned:FILE",
+               fmt::format("coarse model: got '{}', wanted kinematic, limit-surface, planar or learned:FILE",
                            name)};
 }
 

@@ -48,8 +48,7 @@ class CoarseModel {
   virtual void advance(std::span<double> states, std::span<const double> controls, double duration) = 0;
 };
 
-/// `name`: kinematic (Eq. 6.5-6.8), limit-surface, planar, or learned (Sec. 7.2), which
-/// takes its weights from the project's own file, or learned:FILE.
+/// `name`: kinematic (Eq. 6.5-6.8), limit-surface, planar, or learned:FILE (Sec. 7.2).
 /// Errors   kInvalidArgument  unknown name, a scene without a pusher, or a model that
 ///          does not fit the scene; says which and what would
 ///          kIo               a file that cannot be read

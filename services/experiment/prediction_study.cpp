@@ -14,6 +14,7 @@
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/parareal/levels.hpp"
+#include "services/support/files.hpp"
 #include "services/support/statistics.hpp"
 
 namespace jostle::services {
@@ -117,7 +118,7 @@ Made make(const PredictionStudy& study, const PredictionCases& cases, std::size_
           physics_pool::Pool& pool, std::stop_token stop) {
   const PredictionCase& one = cases.cases[index];
   const Scene& scene = cases.scenes[one.scene];
-  auto coarse_result = physics_pool::make_coarse_model(model, scene);
+  auto coarse_result = physics_pool::make_coarse_model(coarse_model_name(model), scene);
   if (!coarse_result) return {.problem = coarse_result.error().message};
   const physics_pool::PlanarUpdate update(scene);
   auto levels_result = physics_pool::predict_levels(pool, one.batch, update, **coarse_result,
@@ -182,7 +183,7 @@ class PredictionStudyRunner final : public Study {
     for (const Scene& scene : cases.scenes) {
       if (auto ok = pool.load(scene); !ok) return ok.error();
       for (const std::string& model : study.models) {
-        if (auto ok = physics_pool::make_coarse_model(model, scene); !ok) return ok.error();
+        if (auto ok = physics_pool::make_coarse_model(coarse_model_name(model), scene); !ok) return ok.error();
       }
     }
 

@@ -12,7 +12,7 @@ namespace jostle::services {
 namespace {
 
 // Sorted by name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kPurposes{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kPurposes{{
     {"bench", "measure physics, pools and planners on this machine"},
     {"coordinator", "plan and re-plan with a pool of workers"},
     {"doctor", "say what is wrong with this machine, and the remedy"},
@@ -21,6 +21,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kPurposes
     {"run", "start everything for a scene on this machine"},
     {"scene", "make, check, disturb and show scene files"},
     {"sim", "simulate the world in which actions happen"},
+    {"train-coarse", "train the learned coarse model of pushing"},
     {"worker", "simulate rollouts for whoever asks"},
 }};
 

@@ -19,6 +19,10 @@ fs::path data_file(const std::string& name) {
   return program_folder().parent_path() / "share" / "jostle" / name;
 }
 
+std::string coarse_model_name(const std::string& name) {
+  return name == "learned" ? "learned:" + data_file("models/coarse-sliders.net").string() : name;
+}
+
 Result<std::string> read_text(const fs::path& file) {
   std::ifstream in(file);
   std::ostringstream text;

@@ -16,6 +16,10 @@ std::filesystem::path program_folder();
 /// looked for below ../share/jostle of the program's folder.
 std::filesystem::path data_file(const std::string& name);
 
+/// A coarse model's name for make_coarse_model: `learned` alone means the network that
+/// comes along, models/coarse-sliders.net.
+std::string coarse_model_name(const std::string& name);
+
 /// Error kIo naming the file.
 Result<std::string> read_text(const std::filesystem::path& file);
 

@@ -62,8 +62,8 @@ std::string objection(std::string_view file, std::string_view include) {
   }
   if (starts_with_any(file, {"physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
                              "physics_pool/sampling/", "physics_pool/coarse/", "physics_pool/parareal/"})) {
-    return allow({"idl/types/", "physics_pool/coarse/", "physics_pool/parareal/", "physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
-                  "physics_pool/sampling/"},
+    return allow({"idl/types/", "physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
+                  "physics_pool/sampling/", "physics_pool/coarse/", "physics_pool/parareal/"},
                  "the engine-free half of physics_pool knows values only");
   }
   if (file.starts_with("physics_pool/")) {
@@ -168,6 +168,9 @@ TEST(Objection, IsRaisedForWrongArrowsOnly) {
       {"physics_pool/local/world.cpp", "mujoco/mujoco.h", true},
       {"physics_pool/render/renderer.cpp", "mujoco/mujoco.h", true},
       {"physics_pool/scene/scene.cpp", "mujoco/mujoco.h", false},
+      {"physics_pool/coarse/learned/forward.cpp", "mujoco/mujoco.h", false},
+      {"physics_pool/coarse/learned/forward.cpp", "physics_pool/local/world.hpp", false},
+      {"physics_pool/coarse/learned/forward.cpp", "physics_pool/scene/scene.hpp", true},
       {"services/worker/main.cpp", "mujoco/mujoco.h", false},
       {"planners/pbsto/pbsto.cpp", "mujoco.h", false},
       {"planners/pbsto/pbsto.cpp", "physics_pool/api/pool.hpp", true},

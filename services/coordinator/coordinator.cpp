@@ -62,7 +62,7 @@ std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::
 
 }  // namespace
 
-Coordinator::Coordinator(const dds::Participant& participant, physics_pool::Pool& pool)
+Coordinator::Coordinator(const dds::Participant& participant, physics_pool::AsyncPool& pool)
     : participant_(participant),
       pool_(pool),
       feedback_writer_(participant, topics::kTaskFeedback),
@@ -96,7 +96,7 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
     feedback_.goal_id(goal_id_);
     feedback_.phase("preparing");
   }
-  spdlog::info("goal {}: controller {}, seed {}", goal.goal_id(), goal.controller(), goal.seed());
+  spdlog::info("goal {}: controller {}, predictor {}, seed {}", goal.goal_id(), goal.controller(), goal.predictor(), goal.seed());
   // A stop of the process cancels the task.
   const std::stop_callback forward(stop, [this] {
     const std::lock_guard lock(mutex_);
@@ -136,22 +136,22 @@ Result<Coordinator::Task> Coordinator::prepare(const Goal& goal) {
   if (!parameters_result) return parameters_result.error();
   auto method_result = parse_controller(goal.controller(), planning_result->task);
   if (!method_result) return method_result.error();
-  physics_pool::Pool& predictor = predictor_of(goal);
-  auto world_result = predictor.load(*planning_result);
+  auto predictor_result = Predictor::make(goal.predictor().empty() ? "fine" : goal.predictor(), pool_,
+                                          [](const std::string& why) { spdlog::info("split: {}", why); });
+  if (!predictor_result) return predictor_result.error();
+  auto world_result = predictor_result->pool().load(*planning_result);
   if (!world_result) return world_result.error();
   Task task{.execution = std::move(execution_result).value(),
             .planning = std::move(planning_result).value(),
             .parameters = std::move(parameters_result).value(),
-            .predictor = predictor,
+            .predictor = std::move(predictor_result).value(),
             .world = *world_result};
   task.parameters.control.method = *method_result;
   task.parameters.control.plan_only = task.parameters.mpc.plan_only = goal.plan_only();
   return task;
 }
 
-physics_pool::Pool& Coordinator::predictor_of(const Goal&) { return pool_; }
-
-Result<planners::Outcome> Coordinator::perform(const Goal& goal, const Task& task, std::stop_token stop) {
+Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task, std::stop_token stop) {
   auto believed_result = physics_pool::World::compile(task.planning);
   if (!believed_result) return believed_result.error();
   const physics_pool::WorldPtr believed = *believed_result;
@@ -159,7 +159,7 @@ Result<planners::Outcome> Coordinator::perform(const Goal& goal, const Task& tas
 
   RobotClient robot(participant_);
   ObjectsClient objects(participant_, robot);
-  planners::Pbsto planner(task.predictor, task.parameters.planner,
+  planners::Pbsto planner(task.predictor.pool(), task.parameters.planner,
                           [&](const planners::Progress& progress) { note(progress, geometry); });
   planners::ControlSetup setup{.planner = planner,
                                .robot = robot,

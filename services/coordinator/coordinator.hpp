@@ -12,6 +12,7 @@
 #include "physics_pool/api/pool.hpp"
 #include "planners/control/controller.hpp"
 #include "services/config/parameters.hpp"
+#include "services/config/predictor.hpp"
 #include "services/dds/participant.hpp"
 #include "services/dds/reader.hpp"
 #include "services/dds/topics.hpp"
@@ -26,7 +27,7 @@ namespace jostle::services {
 /// that silence means death.
 class Coordinator {
  public:
-  Coordinator(const dds::Participant& participant, physics_pool::Pool& pool);
+  Coordinator(const dds::Participant& participant, physics_pool::AsyncPool& pool);
 
   /// Until a stop is requested.
   void run(std::stop_token stop);
@@ -38,16 +39,12 @@ class Coordinator {
   struct Task {
     physics_pool::Scene execution, planning;
     Parameters parameters;
-    physics_pool::Pool& predictor;  ///< what plans are made with
+    Predictor predictor;            ///< what stands between the workers and the planner
     Hash world;                     ///< planning world, known to the predictor
   };
 
-  /// The pool that predicts for a goal's planner. What stands between the workers
-  /// and the planner is chosen here and nowhere else.
-  physics_pool::Pool& predictor_of(const Goal& goal);
-
   Result<Task> prepare(const Goal& goal);
-  Result<planners::Outcome> perform(const Goal& goal, const Task& task, std::stop_token stop);
+  Result<planners::Outcome> perform(const Goal& goal, Task& task, std::stop_token stop);
   void serve(const Goal& goal, std::stop_token stop);
   void refuse_goals_meanwhile(std::stop_token stop);
   void publish_feedback(std::stop_token stop);
@@ -55,7 +52,7 @@ class Coordinator {
   void note(const planners::Progress& progress, const physics_pool::TaskGeometry& geometry);
 
   const dds::Participant participant_;
-  physics_pool::Pool& pool_;
+  physics_pool::AsyncPool& pool_;
 
   std::mutex mutex_;  // guards feedback_, started_, goal_id_ and cancel_
   jostle_msgs::msg::Feedback feedback_;

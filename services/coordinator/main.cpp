@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
     return kExitUsage;
   }
   try {
-    std::unique_ptr<physics_pool::Pool> pool;
+    std::unique_ptr<physics_pool::AsyncPool> pool;
     if (pool_kind == "dds") {
       pool = std::make_unique<RemotePool>(*participant_result);
     } else {

@@ -10,6 +10,7 @@
 #include "physics_pool/scene/yaml_fields.hpp"
 #include "services/experiment/grasping_study.hpp"
 #include "services/experiment/prediction_study.hpp"
+#include "services/experiment/push_study.hpp"
 #include "services/support/files.hpp"
 
 namespace jostle::services {
@@ -26,7 +27,8 @@ Result<std::unique_ptr<Study>> load_study(const std::string& name) {
     yaml::Fields fields(root, "", file.string());
     auto read = &read_grasping_study;
     fields.choice<decltype(read)>("study", read, {{"grasping", &read_grasping_study},
-                                                  {"prediction", &read_prediction_study}});
+                                                  {"prediction", &read_prediction_study},
+                                                  {"push", &read_push_study}});
     if (!root["study"]) {
       return Error{Code::kInvalidArgument, fmt::format("{}: study: missing, wanted a kind of study: these are "
                                                        "parameters", file.string())};

@@ -85,6 +85,10 @@ int main(int argc, char** argv) {
   app.add_option("--controller", options.controller, "To grasp, or: online re-planning (default), nr: naive "
                                                         "re-planning; to push, mpc: model-predictive control (default)")
       ->check(CLI::IsMember({"or", "nr", "mpc"}));
+  app.add_option("--predictor", options.predictor,
+                 "What plans of pushes are made with: fine, coarse[,MODEL], parareal:K[,MODEL][,split] or\n"
+                 "parareal:adaptive[,MODEL][,split]; MODEL is kinematic, limit-surface, planar, learned or learned:FILE")
+      ->capture_default_str();
   app.add_option("--uncertainty", arguments.level, "none, low, medium or high")->capture_default_str();
   app.add_option("--seed", options.seed, "Of all noise, the planner's and the world's")->capture_default_str();
   app.add_option("--pool", options.pool, "dds: worker processes; threads: threads of the coordinator")

@@ -18,6 +18,7 @@ struct RunOptions {
   std::string parameters;        ///< YAML text
   physics_pool::Uncertainty level = physics_pool::Uncertainty::kNone;
   std::string controller;  ///< "or" or "nr" to grasp, "mpc" to push
+  std::string predictor = "fine";  ///< see services/config/predictor.hpp
   std::string pool = "dds";
   int workers = 2;
   std::uint64_t seed = 1;

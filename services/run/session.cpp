@@ -156,6 +156,7 @@ Result<void> Session::send_goal() {
   goal.planning_scene(physics_pool::to_yaml(options_.planning));
   goal.parameters(options_.parameters);
   goal.controller(options_.controller);
+  goal.predictor(options_.predictor);
   goal.seed(options_.seed);
   goal.plan_only(options_.plan_only);
   goal_.write(goal);

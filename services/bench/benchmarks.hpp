@@ -40,6 +40,18 @@ Result<Measurements> measure_early_stop(const Settings& settings);
 /// takes when nobody idles, against the time the batch took.
 Result<Measurements> measure_scheduling(const Settings& settings);
 
+/// One step of 1 s of every coarse model against one of the fine model, microseconds.
+/// The sides answer the same question, not alike.
+Result<Measurements> measure_coarse_models(const Settings& settings);
+
+/// One trajectory by Parareal on all processors against the serial fine model's time
+/// divided by what Eq. 6.4 allows for so many.
+Result<Measurements> measure_parareal(const Settings& settings);
+
+/// The same over N worker processes that wait as long as a slice takes: what the
+/// exchange of slices costs, beyond Eq. 6.4, where there are processors enough.
+Result<Measurements> measure_parareal_scheduling(const Settings& settings);
+
 /// The other process of `round-trip`: answers every task until it is told to
 /// end. Returns the exit code.
 int serve_echo(int domain, std::stop_token stop);

@@ -22,19 +22,22 @@ struct Benchmark {
   Result<Measurements> (*measure)(const Settings&);
 };
 
-constexpr std::array<Benchmark, 5> kBenchmarks{{
+constexpr std::array<Benchmark, 8> kBenchmarks{{
     {"pool-threads", "ThreadPool against bare loops of engine steps", 15, measure_pool_threads},
     {"pool-dds", "two worker processes against two bare loops", 15, measure_pool_dds},
     {"round-trip", "an empty task through the pool against a bare Fast DDS echo", 25, measure_round_trip},
     {"early-stop", "a batch that stops its losers against one that does not", 5, measure_early_stop},
     {"scheduling", "waiting workers against workers that never idle", 5, measure_scheduling},
+    {"coarse-models", "coarse models against the fine one, per control step", 9, measure_coarse_models},
+    {"parareal", "Parareal on all processors against what Eq. 6.4 allows", 15, measure_parareal},
+    {"parareal-scheduling", "Parareal on 4 to 32 waiting workers against Eq. 6.4", 9, measure_parareal_scheduling},
 }};
 
 constexpr const char* kCheapPhysics = "cheap-physics";
 
 int list() {
-  fmt::print("{:<14} {}\n", kCheapPhysics, "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers");
-  for (const Benchmark& benchmark : kBenchmarks) fmt::print("{:<14} {}\n", benchmark.name, benchmark.purpose);
+  fmt::print("{:<20} {}\n", kCheapPhysics, "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers");
+  for (const Benchmark& benchmark : kBenchmarks) fmt::print("{:<20} {}\n", benchmark.name, benchmark.purpose);
   return kExitOk;
 }
 

@@ -27,7 +27,7 @@ Scene sliders_in_a_row(int sliders, const std::string& integrator) {
   scene.name = "parareal benchmark";
   scene.surface.size = {4.0, 4.0};
   scene.robot.model = "pusher";
-  scene.robot.x = -0.06;
+  scene.robot.x = -0.063;
   scene.robot.y = 0.02;
   for (int i = 0; i < sliders; ++i) {
     scene.objects.push_back({.name = fmt::format("slider{}", i), .shape = Shape::kCylinder, .radius = 0.05115,

@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <climits>
+#include <optional>
 #include <sstream>
 #include <vector>
 
@@ -25,15 +26,12 @@ std::vector<std::string> words_of(const std::string& text) {
   return words;
 }
 
-}  // namespace
-
-Result<Predictor> Predictor::make(const std::string& text, physics_pool::AsyncPool& pool,
-                                  std::function<void(const std::string&)> on_split) {
-  Predictor predictor(pool);
+// Nothing: the fine model.
+Result<std::optional<physics_pool::PararealOptions>> parse(const std::string& text) {
   std::vector<std::string> words = words_of(text);
   if (words.empty()) return unknown(text);
-  if (words == std::vector<std::string>{"fine"}) return predictor;
-  physics_pool::PararealOptions options{.on_split = std::move(on_split)};
+  if (words == std::vector<std::string>{"fine"}) return std::optional<physics_pool::PararealOptions>{};
+  physics_pool::PararealOptions options;
   const std::string method = words.front();
   words.erase(words.begin());
   constexpr std::string_view kParareal = "parareal:";
@@ -55,8 +53,29 @@ Result<Predictor> Predictor::make(const std::string& text, physics_pool::AsyncPo
   }
   if (words.size() > 1) return unknown(text);
   if (!words.empty()) options.model = coarse_model_name(words.front());
-  predictor.parareal_ = std::make_unique<physics_pool::PararealPool>(pool, std::move(options));
+  return std::optional(std::move(options));
+}
+
+}  // namespace
+
+Result<Predictor> Predictor::make(const std::string& text, physics_pool::AsyncPool& pool,
+                                  std::function<void(const std::string&)> on_split) {
+  auto options_result = parse(text);
+  if (!options_result) return options_result.error();
+  Predictor predictor(pool);
+  if (!*options_result) return predictor;
+  (*options_result)->on_split = std::move(on_split);
+  predictor.parareal_ = std::make_unique<physics_pool::PararealPool>(pool, **std::move(options_result));
   return predictor;
+}
+
+Result<void> Predictor::check(const std::string& text, const physics_pool::Scene& scene) {
+  auto options_result = parse(text);
+  if (!options_result) return options_result.error();
+  if (!*options_result) return {};
+  auto model_result = physics_pool::make_coarse_model((*options_result)->model, scene);
+  if (!model_result) return Error{model_result.error().code, "predictor: " + model_result.error().message};
+  return {};
 }
 
 }  // namespace jostle::services

@@ -28,6 +28,9 @@ class Predictor {
   static Result<Predictor> make(const std::string& text, physics_pool::AsyncPool& pool,
                                 std::function<void(const std::string&)> on_split = {});
 
+  /// The same checks without a pool, and whether the model fits the scene.
+  static Result<void> check(const std::string& text, const physics_pool::Scene& scene);
+
   physics_pool::Pool& pool() { return parareal_ ? static_cast<physics_pool::Pool&>(*parareal_) : engine_; }
 
  private:

@@ -11,6 +11,7 @@
 #include "services/experiment/grasping_study.hpp"
 #include "services/experiment/prediction_study.hpp"
 #include "services/experiment/push_study.hpp"
+#include "services/experiment/timing_study.hpp"
 #include "services/support/files.hpp"
 
 namespace jostle::services {
@@ -28,7 +29,8 @@ Result<std::unique_ptr<Study>> load_study(const std::string& name) {
     auto read = &read_grasping_study;
     fields.choice<decltype(read)>("study", read, {{"grasping", &read_grasping_study},
                                                   {"prediction", &read_prediction_study},
-                                                  {"push", &read_push_study}});
+                                                  {"push", &read_push_study},
+                                                  {"timing", &read_timing_study}});
     if (!root["study"]) {
       return Error{Code::kInvalidArgument, fmt::format("{}: study: missing, wanted a kind of study: these are "
                                                        "parameters", file.string())};

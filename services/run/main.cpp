@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "services/config/parameters.hpp"
+#include "services/config/predictor.hpp"
 #include "services/run/display.hpp"
 #include "services/run/report.hpp"
 #include "services/run/session.hpp"
@@ -37,6 +38,7 @@ Result<void> complete(const Arguments& arguments, RunOptions& options) {
     return Error{Code::kInvalidArgument, fmt::format("--controller: got {} for a task to {}, wanted {}", options.controller,
                                                      options.scene.task.kind, push ? "mpc" : "or, nr")};
   }
+  if (auto ok = Predictor::check(options.predictor, options.planning); !ok) return Error{ok.error().code, "--" + ok.error().message};
   const std::filesystem::path file =
       arguments.parameters.empty() ? data_file(push ? "experiments/pushing.yaml" : "experiments/grasping.yaml")
                                    : std::filesystem::path(arguments.parameters);

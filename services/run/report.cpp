@@ -72,6 +72,7 @@ Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::Goa
     return Error{Code::kInternal, "result: the coordinator's report is not JSON"};
   }
   report["controller"] = options.controller;
+  report["predictor"] = options.predictor;
   report["uncertainty"] = physics_pool::to_string(options.level);
   report["pool"] = options.pool;
   report["workers"] = options.workers;

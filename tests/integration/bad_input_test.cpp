@@ -65,6 +65,8 @@ TEST_F(BadInput, ArgumentsAreRefusedWithGotAndWanted) {
   expect_refused({easy, "--controller", "mpc"}, {"--controller", "got mpc for a task to grasp", "wanted or, nr"});
   expect_refused({folder.write("push.yaml", physics_pool::to_yaml(push_ahead())), "--controller", "nr"},
                  {"--controller", "got nr for a task to push", "wanted mpc"});
+  expect_refused({easy, "--predictor", "oracle"}, {"--predictor", "got 'oracle'", "wanted fine, coarse"});
+  expect_refused({easy, "--predictor", "parareal:1"}, {"--predictor", "robot.model", "wanted pusher"});
   expect_refused({easy, "--uncertainty", "total"}, {"uncertainty", "total", "none, low, medium or high"});
   expect_refused({easy, "--pool", "swimming"}, {"pool", "swimming", "dds", "threads"});
   expect_refused({easy, "--workers", "-1"}, {"workers", "-1"});

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "services/dds/reader.hpp"
 #include "services/dds/topics.hpp"
@@ -77,18 +78,24 @@ TEST_F(Run, PushesAlikeWithThreadsAndWorkers) {
   const auto scene = folder.write("push.yaml", physics_pool::to_yaml(push_around()));
   const auto parameters = folder.write("never.yaml", "planner: {rollouts: 8, sigma: [0.01, 0.01], limit: [0.1, 0.1]}\n"
                                                      "objective: {success_cost: 1.0e-9}\nmpc: {first_iterations: 3}\n");
-  std::optional<json> first;
-  for (const char* pool : {"threads", "dds"}) {
-    SCOPED_TRACE(pool);
-    ASSERT_EQ(finish({scene, "--plan-only", "--pool", pool, "--parameters", parameters, "--json", result_file()}), 1)
-        << run->err();  // no plan is good enough
+  std::set<std::string> plans;
+  for (const char* predictor : {"fine", "parareal:1,planar", "coarse,kinematic"}) {
+    std::optional<json> first;
+    for (const char* pool : {"threads", "dds"}) {
+      SCOPED_TRACE(fmt::format("{} {}", predictor, pool));
+      ASSERT_EQ(finish({scene, "--plan-only", "--predictor", predictor, "--pool", pool, "--parameters", parameters, "--json",
+                        result_file()}), 1) << run->err();  // no plan is good enough
 
-    const json report = result();
-    if (!first) first = report;
-    EXPECT_EQ(report["iterations"], 3);
-    EXPECT_EQ(report["plan_hash"], (*first)["plan_hash"]);
-    EXPECT_EQ(report["rollouts"], (*first)["rollouts"]);
+      const json report = result();
+      if (!first) first = report;
+      EXPECT_EQ(report["predictor"], predictor);
+      EXPECT_EQ(report["iterations"], 3);
+      EXPECT_EQ(report["plan_hash"], (*first)["plan_hash"]);
+      EXPECT_EQ(report["rollouts"], (*first)["rollouts"]);
+    }
+    plans.insert((*first)["plan_hash"]);
   }
+  EXPECT_EQ(plans.size(), 3u) << "every predictor should lead to another plan here";
 }
 
 TEST_F(Run, NamesTheSceneByTheHashThatCheckPrints) {

@@ -32,6 +32,8 @@ Result<std::vector<Transition>> run_episode(physics_pool::Pool& pool, const Data
   return Error{Code::kInternal, fmt::format("episode {}: diverged {} times, last: {}", episode, kMaxAttempts, reason)};
 }
 
+Error interrupted() { return {Code::kCancelled, "interrupted; the same command continues"}; }
+
 // Episodes finish in any order and are written in theirs.
 class Collector {
  public:
@@ -57,7 +59,7 @@ class Collector {
     const std::lock_guard lock(mutex_);
     if (error_ || next_ >= end_) return {};
     if (stop_.stop_requested()) {
-      error_ = Error{Code::kCancelled, "interrupted"};
+      error_ = interrupted();
       return {};
     }
     return next_++;
@@ -68,7 +70,7 @@ class Collector {
       auto transitions_result = run_episode(pool_, options_.origin, *episode, stop_.get_token());
       const std::lock_guard lock(mutex_);
       if (!transitions_result) {
-        if (!error_) error_ = transitions_result.error();
+        if (!error_) error_ = stop_.stop_requested() ? interrupted() : transitions_result.error();
         stop_.request_stop();
         return;
       }

@@ -259,7 +259,7 @@ void RemotePool::absorb_results(TimePoint now) {
 void RemotePool::absorb(const msg::TaskResult& result, TimePoint now) {
   const auto found = active_.find(result.epoch());
   if (found == active_.end()) {
-    scheduler_.accept(result.worker(), result.epoch(), result.sample(), 0);  // late: counted
+    scheduler_.accept(result.worker(), result.epoch(), result.sample(), 0, now);  // late: counted
     return;
   }
   const std::shared_ptr<Active> active = found->second;
@@ -278,7 +278,7 @@ void RemotePool::absorb(const msg::TaskResult& result, TimePoint now) {
     scheduler_.bench(result.worker(), now);
     return;
   }
-  if (!scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps())) return;
+  if (!scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps(), now)) return;
   adopt(*active, std::move(outcome_result).value());
   if (scheduler_.missing(active->epoch) > 0) return;
   active->reply.winner = physics_pool::select_winner(active->reply.outcomes, active->batch.incumbent);

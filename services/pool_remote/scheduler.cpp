@@ -8,6 +8,7 @@ namespace {
 constexpr int kLargestCapacity = 1024;  // threads of one process; more is a broken heartbeat
 constexpr int kSpare = 1;               // samples a worker holds beyond what it can run
 constexpr std::uint8_t kCopies = 2;     // of one sample at a time
+constexpr double kSlow = 2.0;           // times the typical time: worth a copy
 constexpr int kEmptyHeartbeats = 2;     // the first may have crossed a task on its way
 
 }  // namespace
@@ -76,7 +77,7 @@ std::uint32_t Scheduler::missing(Epoch epoch) const {
   return found == batches_.end() ? 0 : found->second.missing;
 }
 
-bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps) {
+bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now) {
   const auto worker = workers_.find(id);
   if (worker != workers_.end()) {
     auto& outstanding = worker->second.outstanding;
@@ -84,6 +85,8 @@ bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint
       return candidate.epoch == epoch && candidate.sample == sample;
     });
     if (entry != outstanding.end()) {
+      constexpr double kNews = 0.1;  // weight of one more
+      typical_ += kNews * (now - entry->since - typical_);
       release(*entry);
       outstanding.erase(entry);
     }
@@ -191,8 +194,10 @@ bool Scheduler::next_copy(const Worker& idle, TimePoint now, Choice& choice) con
       const Outstanding& entry = worker.outstanding[i];
       const Batch& batch = batches_.at(entry.epoch);
       const Sample& sample = batch.samples[entry.sample - batch.first_sample];
-      if (sample.done || sample.copies >= kCopies || entry.since + options_.copy_after > now) continue;
       const bool runs = i < static_cast<std::size_t>(worker.status.capacity);
+      const auto age = now - entry.since;
+      if (sample.done || sample.copies >= kCopies || age < options_.copy_after) continue;
+      if (runs && age < kSlow * typical_) continue;
       if (found && std::tie(runs, entry.since) >= std::tie(best_runs, best_since)) continue;
       found = true;
       best_runs = runs;

@@ -40,8 +40,10 @@ struct SchedulerOptions {
   std::chrono::milliseconds silence{500};
   /// Samples a worker has not, this long after they were sent, are lost.
   std::chrono::milliseconds lost_after{300};
-  /// Near the end of a batch, a sample outstanding for so long is given to an
-  /// idle worker as well. Shorter copies what is about to return anyway.
+  /// Near the end of a batch, a sample that has waited behind another for so long is
+  /// given to an idle worker as well; one that runs, once it has also taken twice as
+  /// long as samples lately did. Shorter copies what is about to return anyway, and a
+  /// copy is in the way of what comes next.
   std::chrono::milliseconds copy_after{20};
   /// A worker that could not do its work gets none for so long.
   std::chrono::seconds bench{5};
@@ -77,7 +79,7 @@ class Scheduler {
 
   /// A sample came back. True when it is the first result of that sample;
   /// otherwise it is late or a duplicate, and counted.
-  bool accept(WorkerId worker, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps);
+  bool accept(WorkerId worker, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now);
   /// Samples above this one are no longer wanted.
   void drop_above(Epoch epoch, std::uint32_t sample);
 
@@ -131,6 +133,7 @@ class Scheduler {
   std::map<WorkerId, Worker> workers_;
   std::map<Epoch, Batch> batches_;
   Epoch last_served_ = 0;
+  std::chrono::duration<double> typical_{0.0};  // from handing out to coming back, lately
   std::uint64_t reissued_ = 0;
   std::uint64_t duplicates_ = 0;
 };

@@ -32,7 +32,7 @@ class SchedulerTest : public ::testing::Test {
     return samples;
   }
 
-  bool accept(WorkerId worker, std::uint32_t sample) { return sut.accept(worker, kBatch, sample, 100); }
+  bool accept(WorkerId worker, std::uint32_t sample) { return sut.accept(worker, kBatch, sample, 100, now); }
 
   const SchedulerOptions options;
   Scheduler sut{options};
@@ -224,9 +224,9 @@ TEST_F(SchedulerTest, ForgetsTheLongDead) {
 TEST_F(SchedulerTest, ResultsOfNobodyAreCountedAndDropped) {
   sut.start(kBatch, 5, 2);
 
-  EXPECT_FALSE(sut.accept(99, 77, 5, 0));
-  EXPECT_FALSE(sut.accept(99, kBatch, 4, 0));
-  EXPECT_FALSE(sut.accept(99, kBatch, 7, 0));
+  EXPECT_FALSE(sut.accept(99, 77, 5, 0, now));
+  EXPECT_FALSE(sut.accept(99, kBatch, 4, 0, now));
+  EXPECT_FALSE(sut.accept(99, kBatch, 7, 0, now));
   EXPECT_EQ(sut.status().duplicates, 3u);
 }
 

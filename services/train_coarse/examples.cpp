@@ -39,14 +39,15 @@ void add(Errors& errors, const DataOrigin& origin, const Transition& transition,
     const auto pose = static_cast<std::size_t>(layout.pose(i));
     const auto moved = [&](std::size_t axis) { return transition.after[axis] - transition.before[axis]; };
     const double way = std::hypot(moved(pose), moved(pose + 1));
-    const double error = std::hypot(predicted[pose] - transition.after[pose], predicted[pose + 1] - transition.after[pose + 1]);
+    const auto wrong = [&](std::size_t axis) { return predicted[axis] - transition.after[axis]; };
+    const double error = std::hypot(wrong(pose), wrong(pose + 1));
     errors.all += error;
     errors.all_squares += error * error;
     ++errors.everything;
     if (way < kMoved) continue;
     errors.way += way;
     errors.position.push_back(error);
-    errors.angle.push_back(std::abs(std::remainder(predicted[pose + 2] - transition.after[pose + 2], 2 * std::numbers::pi)));
+    errors.angle.push_back(std::abs(std::remainder(wrong(pose + 2), 2 * std::numbers::pi)));
   }
   ++errors.transitions;
   const double depth = -clearance(origin, state, count);
@@ -80,7 +81,9 @@ Accuracy summary(int sliders, const Errors& errors) {
 }  // namespace
 
 PushBodies bodies_of(const DataOrigin& origin) {
-  return {.pusher_radius = origin.pusher_radius, .slider_radius = origin.slider_radius, .slider_friction = origin.slider_friction};
+  return {.pusher_radius = origin.pusher_radius,
+          .slider_radius = origin.slider_radius,
+          .slider_friction = origin.slider_friction};
 }
 
 bool is_part(Part part, double held_out, std::size_t transition) {
@@ -143,15 +146,17 @@ std::vector<Accuracy> accuracy_of(const Network& network, const TransitionFile& 
 
 std::string accuracy_table(const std::vector<Accuracy>& rows) {
   constexpr double kDegrees = 180 / std::numbers::pi;
-  std::string text = fmt::format("{:>7} {:>8} {:>7} | {:>6} {:>6} {:>6} | {:>6} {:>6} | {:>6} {:>6} | {:>6} {:>6} {:>7}\n", "sliders",
-                                 "pushed", "way mm", "mean", "median", "90 %", "median", "90 %", "mean", "rms", "pen. %", "mean", "deepest");
-  text += fmt::format("{:>7} {:>8} {:>7} | {:^20} | {:^13} | {:^13} | {:^21}\n", "", "", "", "error of pushed, mm", "angle, deg",
-                      "of all, mm", "penetration, mm");
+  std::string text = fmt::format("{:>7} {:>8} {:>7} | {:>6} {:>6} {:>6} | {:>6} {:>6} | {:>6} {:>6} | {:>6} {:>6} {:>7}\n",
+                                 "sliders", "pushed", "way mm", "mean", "median", "90 %", "median", "90 %", "mean", "rms",
+                                 "pen. %", "mean", "deepest");
+  text += fmt::format("{:>7} {:>8} {:>7} | {:^20} | {:^13} | {:^13} | {:^21}\n", "", "", "", "error of pushed, mm",
+                      "angle, deg", "of all, mm", "penetration, mm");
   for (const Accuracy& row : rows) {
-    text += fmt::format("{:>7} {:>8} {:>7.1f} | {:>6.2f} {:>6.2f} {:>6.2f} | {:>6.2f} {:>6.2f} | {:>6.2f} {:>6.2f} | {:>6.1f} {:>6.2f} {:>7.2f}\n",
-                        row.sliders, row.pushed, 1e3 * row.mean_way, 1e3 * row.mean, 1e3 * row.median, 1e3 * row.p90,
-                        kDegrees * row.angle_median, kDegrees * row.angle_p90, 1e3 * row.all_mean, 1e3 * row.all_rms,
-                        1e2 * row.penetrating, 1e3 * row.mean_depth, 1e3 * row.deepest);
+    text += fmt::format("{:>7} {:>8} {:>7.1f} | {:>6.2f} {:>6.2f} {:>6.2f} | ", row.sliders, row.pushed, 1e3 * row.mean_way,
+                        1e3 * row.mean, 1e3 * row.median, 1e3 * row.p90);
+    text += fmt::format("{:>6.2f} {:>6.2f} | {:>6.2f} {:>6.2f} | {:>6.1f} {:>6.2f} {:>7.2f}\n", kDegrees * row.angle_median,
+                        kDegrees * row.angle_p90, 1e3 * row.all_mean, 1e3 * row.all_rms, 1e2 * row.penetrating,
+                        1e3 * row.mean_depth, 1e3 * row.deepest);
   }
   return text;
 }

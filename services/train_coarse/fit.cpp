@@ -115,7 +115,8 @@ Network frame_of(const TransitionFile& data, const Examples& examples) {
   // An input that is always the same says nothing; and nothing is divided by zero.
   network.input_scale = values_of(inputs.std(0, false).clamp_min(1e-3));
   for (int slot = 0; slot < kSlots; ++slot) {
-    const float units[kSlotOutputs] = {kPositionUnit, kPositionUnit, kAngleUnit, kVelocityUnit, kVelocityUnit, kVelocityUnit};
+    const float units[kSlotOutputs] = {kPositionUnit, kPositionUnit, kAngleUnit,
+                                       kVelocityUnit, kVelocityUnit, kVelocityUnit};
     network.output_scale.insert(network.output_scale.end(), std::begin(units), std::end(units));
   }
   return network;
@@ -200,7 +201,8 @@ double difference_with_torch(const Network& network, const TransitionFile& data)
   torch::Tensor x = (tensor_of(examples.inputs, kInputs) - tensor_of(network.input_mean, kInputs)) /
                     tensor_of(network.input_scale, kInputs);
   for (const NetworkLayer& layer : network.layers) {
-    x = torch::nn::functional::linear(x, tensor_of(layer.weights, layer.inputs), tensor_of(layer.biases, layer.outputs).squeeze(0));
+    x = torch::nn::functional::linear(x, tensor_of(layer.weights, layer.inputs),
+                                      tensor_of(layer.biases, layer.outputs).squeeze(0));
     if (&layer != &network.layers.back()) x = torch::relu(x);
   }
   x = x * tensor_of(network.output_scale, kOutputs);

@@ -238,7 +238,8 @@ void PushView::touched(std::span<const float> outputs, std::array<bool, kSlots>&
   const auto end = pusher_end();
   is_touched = {};
   for (int slot = 0; slot < slots_; ++slot) {
-    is_touched[at(slot)] = segment_distance(x_[at(slot)], y_[at(slot)], 0, 0, end[0], end[1]) < bodies_.pusher_reach() + kTouch;
+    is_touched[at(slot)] = segment_distance(x_[at(slot)], y_[at(slot)], 0, 0, end[0], end[1]) <
+                           bodies_.pusher_reach() + kTouch;
   }
   for (int round = 1; round < slots_; ++round) {
     for (int i = 0; i < slots_; ++i) {

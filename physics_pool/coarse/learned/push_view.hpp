@@ -70,7 +70,9 @@ class PushView {
   /// Where the pusher's axis ends, in fold's frame, m.
   std::array<double, 2> pusher_end() const { return {way_ * cos_, way_ * sin_}; }
   /// Where a slot's slider ends by the rough guess, in fold's frame, m.
-  std::array<double, 2> guess(int slot) const { return {x_[at(slot)] + guess_x_[at(slot)], y_[at(slot)] + guess_y_[at(slot)]}; }
+  std::array<double, 2> guess(int slot) const {
+    return {x_[at(slot)] + guess_x_[at(slot)], y_[at(slot)] + guess_y_[at(slot)]};
+  }
 
  private:
   static std::size_t at(int index) { return static_cast<std::size_t>(index); }

@@ -45,7 +45,10 @@ std::vector<double> state_of(double px, double py, const std::vector<Slider>& sl
 }
 
 // Four sliders that the pusher reaches, directly or not.
-const std::vector<Slider> kCrowd{{0.08, 0.02, 0.3, 0.01, 0.02, 0.1}, {0.19, 0.01, -1.0}, {0.1, 0.13, 2.0}, {0.13, -0.1, 3.0, 0.0, -0.03, 0.0}};
+const std::vector<Slider> kCrowd{{0.08, 0.02, 0.3, 0.01, 0.02, 0.1},
+                                 {0.19, 0.01, -1.0},
+                                 {0.1, 0.13, 2.0},
+                                 {0.13, -0.1, 3.0, 0.0, -0.03, 0.0}};
 constexpr std::array<double, 2> kAhead{0.09, 0.03};
 
 std::vector<double> advanced(CoarseModel& sut, std::vector<double> state, std::array<double, 2> u, double duration = 1.0) {

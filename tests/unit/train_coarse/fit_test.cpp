@@ -60,7 +60,8 @@ TEST_F(FitTest, ForwardPassIsLibtorchs) {
 
 TEST_F(FitTest, StopsWhenItIsTold) {
   std::stop_source stop;
-  const auto sut = fit(data_, {.epochs = 1000, .threads = 1}, stop.get_token(), [&](const FitProgress&) { stop.request_stop(); });
+  const auto sut = fit(data_, {.epochs = 1000, .threads = 1}, stop.get_token(),
+                       [&](const FitProgress&) { stop.request_stop(); });
   EXPECT_TRUE(sut) << "the best so far";
   const auto at_once = fit(data_, {.epochs = 1000, .threads = 1}, stop.get_token());
   ASSERT_FALSE(at_once);

@@ -27,6 +27,7 @@ PararealIteration::PararealIteration(const PlanarUpdate& update, CoarseModel& co
   levels_.resize(static_cast<std::size_t>(stop_.iterations) + 1);
   for (Level& each : levels_) {
     each.states.resize(static_cast<std::size_t>(steps_) + 1);
+    each.starts.resize(static_cast<std::size_t>(steps_));
     each.coarse.resize(static_cast<std::size_t>(steps_));
     each.slices.resize(static_cast<std::size_t>(steps_), -1);
     each.states[0] = x0;
@@ -42,6 +43,8 @@ void PararealIteration::next_start(std::span<double> planar) const {
 void PararealIteration::guess(std::span<const double> planar) {
   Level& first = level(0);
   const auto n = static_cast<std::size_t>(first.known - 1);
+  first.starts[n].resize(planar.size());
+  to_planar(update_.layout(), first.states[n], first.starts[n]);
   take_coarse(first, n, {planar.begin(), planar.end()}, 0);
   State x = first.states[n];
   if (problem_.empty()) {
@@ -89,12 +92,14 @@ void PararealIteration::know(int k, State x) {
   if (here.known > steps_) return judge(k);
   const Level& before = level(k - 1);
   if (here.states[n] == before.states[n]) {
+    here.starts[n] = before.starts[n];
     here.coarse[n] = before.coarse[n];
     here.slices[n] = before.slices[n];
     return;
   }
   std::vector<double> planar(static_cast<std::size_t>(update_.planar_layout().size()));
   to_planar(update_.layout(), here.states[n], planar);
+  here.starts[n] = planar;
   coarse_.advance(planar, controls_.step(static_cast<int>(n)), duration_);
   take_coarse(here, n, std::move(planar), k);
   if (k < stop_.iterations) open_slice(k, n);  // nothing starts from the last level
@@ -112,7 +117,7 @@ void PararealIteration::fill() {
       if (!fine) break;
       State x = *fine;
       if (next.states[n] != here.states[n]) {
-        update_.correct(x, next.coarse[n], here.coarse[n]);
+        update_.correct(x, {next.starts[n], next.coarse[n]}, {here.starts[n], here.coarse[n]}, stop_.correction_limit);
         update_.project(x);
       }
       know(k + 1, std::move(x));

@@ -2,6 +2,7 @@
 /// \file
 /// The Parareal iteration of one trajectory, without threads or pools.
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -18,6 +19,8 @@ struct PararealStop {
   bool adaptive = false;
   double translation_mm = 8.10;  ///< defaults: how repeatable real pushes are
   double rotation_deg = 4.20;    ///< (Yu et al., IROS 2016; Table 6.1)
+  /// Of PlanarUpdate::correct; infinity is Eq. 6.3 to the letter.
+  double correction_limit = std::numeric_limits<double>::infinity();
 };
 
 /// x_{n+1}^{k+1} = C(x_n^{k+1}, u_n) + F(x_n^k, u_n) - C(x_n^k, u_n)     (6.3)
@@ -67,6 +70,7 @@ class PararealIteration {
  private:
   struct Level {
     std::vector<State> states;                // [N + 1], known up to `known`
+    std::vector<std::vector<double>> starts;  // [N] x_n as C takes it
     std::vector<std::vector<double>> coarse;  // [N] C(x_n)
     std::vector<int> slices;                  // [N] index of the slice that starts there
     int known = 0;                            // states

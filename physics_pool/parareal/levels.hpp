@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "physics_pool/api/pool.hpp"
-#include "physics_pool/parareal/planar_update.hpp"
+#include "physics_pool/parareal/iteration.hpp"
 
 namespace jostle::physics_pool {
 
@@ -19,6 +19,7 @@ RolloutBatch slice_batch(const RolloutBatch& of, const State& start, std::span<c
 /// Errors   those of Pool::run
 ///          kInternal  a slice diverged, or the coarse model lost itself; says why
 Result<std::vector<Trajectory>> predict_levels(Pool& pool, const RolloutBatch& batch, const PlanarUpdate& update,
-                                               CoarseModel& coarse, TimePoint deadline, std::stop_token stop = {});
+                                               CoarseModel& coarse, TimePoint deadline, std::stop_token stop = {},
+                                               double correction_limit = PararealStop{}.correction_limit);
 
 }  // namespace jostle::physics_pool

@@ -62,21 +62,38 @@ void PlanarUpdate::replace(State& x, std::span<const double> planar) const {
   }
 }
 
-void PlanarUpdate::correct(State& x, std::span<const double> c_new, std::span<const double> c_old) const {
+// A turn by one radian moves the border by so much, m.
+double PlanarUpdate::reach(std::size_t slider) const {
+  const Outline& shape = outlines_[slider];
+  return shape.radius > 0 ? shape.radius : std::hypot(shape.half_x, shape.half_y);
+}
+
+void PlanarUpdate::correct(State& x, const Step& now, const Step& before, double limit) const {
   const PlanarLayout at = planar_layout();
-  const auto delta = [&](int i) { return c_new[static_cast<std::size_t>(i)] - c_old[static_cast<std::size_t>(i)]; };
+  const auto minus = [](std::span<const double> a, std::span<const double> b, int i) {
+    return a[static_cast<std::size_t>(i)] - b[static_cast<std::size_t>(i)];
+  };
+  const auto moved = [&](int i) { return minus(now.end, before.end, i); };
   for (int axis = 0; axis < 2; ++axis) {
-    x.q[static_cast<std::size_t>(axis)] += delta(axis);
-    x.v[static_cast<std::size_t>(axis)] += delta(at.pusher_velocity() + axis);
+    x.q[static_cast<std::size_t>(axis)] += moved(axis);
+    x.v[static_cast<std::size_t>(axis)] += moved(at.pusher_velocity() + axis);
   }
+  const double pusher = std::hypot(minus(now.start, before.start, 0), minus(now.start, before.start, 1));
   for (int i = 0; i < at.sliders; ++i) {
     const auto slider = static_cast<std::size_t>(i);
     const int p = at.pose(i), d = at.velocity(i);
-    displace(x, slider, delta(p), delta(p + 1), std::remainder(delta(p + 2), 2 * std::numbers::pi));
+    const auto size = [&](std::span<const double> a, std::span<const double> b) {
+      return std::hypot(minus(a, b, p), minus(a, b, p + 1)) +
+             reach(slider) * std::abs(std::remainder(minus(a, b, p + 2), 2 * std::numbers::pi));
+    };
+    const double correction = size(now.end, before.end);
+    const double allowed = limit * (size(now.start, before.start) + pusher);
+    const double share = correction > allowed ? allowed / correction : 1.0;
+    displace(x, slider, share * moved(p), share * moved(p + 1), share * std::remainder(moved(p + 2), 2 * std::numbers::pi));
     double* const v = &x.v[static_cast<std::size_t>(layout_.objects[slider].v)];
-    v[0] += delta(d);
-    v[1] += delta(d + 1);
-    v[5] += delta(d + 2);
+    v[0] += share * moved(d);
+    v[1] += share * moved(d + 1);
+    v[5] += share * moved(d + 2);
   }
 }
 

@@ -23,9 +23,16 @@ class PlanarUpdate {
   /// whose centre is beyond the surface's edge is put below it: it has fallen.
   void replace(State& x, std::span<const double> planar) const;
 
-  /// x + (c_new - c_old): Eq. 6.3, where x is F(x_n^k) and the others are C(x_n^{k+1})
-  /// and C(x_n^k).
-  void correct(State& x, std::span<const double> c_new, std::span<const double> c_old) const;
+  /// One application of C: the planar state it began with, and the one it came to.
+  struct Step {
+    std::span<const double> start, end;
+  };
+
+  /// x + (C(now) - C(before)): Eq. 6.3, where x is F(x_n^k), and C was applied to
+  /// x_n^{k+1} now and to x_n^k before. No slider is corrected by more than `limit` times
+  /// the change of what C began with, its own and the pusher's: where one start
+  /// touches and the other does not, C jumps by a whole push, and F does not.
+  void correct(State& x, const Step& now, const Step& before, double limit) const;
 
   /// Moves sliders, as little as it takes, until none is deeper in the pusher or in
   /// another than kTolerance: Eq. 6.9 along contact normals, for any number of
@@ -44,6 +51,7 @@ class PlanarUpdate {
   PlanarLayout planar_layout() const { return {static_cast<int>(layout_.objects.size())}; }
 
  private:
+  double reach(std::size_t slider) const;
   void displace(State& x, std::size_t slider, double dx, double dy, double turn) const;
 
   StateLayout layout_;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "physics_pool/coarse/coarse_model.hpp"
 #include "physics_pool/sampling/counter_rng.hpp"
 
 namespace jostle::services {
@@ -168,26 +169,12 @@ physics_pool::RolloutBatch draw_episode(const DataOrigin& origin, std::uint32_t 
 
 std::vector<Transition> transitions_of(const physics_pool::RolloutBatch& batch, const Trajectory& trajectory,
                                        int sliders) {
-  const int joints = kPusherAxes, half = 2 + 3 * sliders;
+  const StateLayout layout = layout_of(training_scene({}, sliders));
+  std::vector<double> exact(static_cast<std::size_t>(physics_pool::PlanarLayout{sliders}.size()));
   const auto planar = [&](const State& x) {
+    physics_pool::to_planar(layout, x, exact);
     std::array<float, kPlanarSize> state{};
-    for (int i = 0; i < joints; ++i) {
-      state[static_cast<std::size_t>(i)] = static_cast<float>(x.q[static_cast<std::size_t>(i)]);
-      state[static_cast<std::size_t>(half + i)] = static_cast<float>(x.v[static_cast<std::size_t>(i)]);
-    }
-    for (int i = 0; i < sliders; ++i) {
-      const double* q = x.q.data() + joints + 7 * i;
-      const double* v = x.v.data() + joints + 6 * i;
-      const double yaw = std::atan2(2 * (q[3] * q[6] + q[4] * q[5]), 1 - 2 * (q[5] * q[5] + q[6] * q[6]));
-      float* pose = state.data() + 2 + 3 * i;
-      float* velocity = pose + half;
-      pose[0] = static_cast<float>(q[0]);
-      pose[1] = static_cast<float>(q[1]);
-      pose[2] = static_cast<float>(yaw);
-      velocity[0] = static_cast<float>(v[0]);
-      velocity[1] = static_cast<float>(v[1]);
-      velocity[2] = static_cast<float>(v[5]);
-    }
+    std::ranges::transform(exact, state.begin(), [](double value) { return static_cast<float>(value); });
     return state;
   };
   std::vector<Transition> transitions;

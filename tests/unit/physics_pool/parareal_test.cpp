@@ -188,7 +188,7 @@ TEST(PlanarUpdate, CorrectionTurnsAboutTheVertical) {
   after[4] += std::numbers::pi;  // a half turn more is fine
   after[9] += 2.0;
 
-  sut.correct(x, after, before);
+  sut.correct(x, {before, after}, {before, before}, HUGE_VAL);
 
   std::vector<double> planar(10);
   to_planar(sut.layout(), x, planar);
@@ -198,6 +198,22 @@ TEST(PlanarUpdate, CorrectionTurnsAboutTheVertical) {
   double norm = 0.0;
   for (int i = 5; i < 9; ++i) norm += x.q[static_cast<std::size_t>(i)] * x.q[static_cast<std::size_t>(i)];
   EXPECT_NEAR(norm, 1.0, 1e-12);
+}
+
+TEST(PlanarUpdate, CorrectionKeepsToItsLimit) {
+  const Scene scene = one_slider();
+  const PlanarUpdate sut(scene);
+  State x = initial_state(scene);
+  std::vector<double> before(10), now(10);
+  to_planar(sut.layout(), x, before);
+  now = before;
+  now[2] += 0.001;  // the starts are 1 mm apart,
+  std::vector<double> far = now;
+  far[2] += 0.1;    // and C has lost the slider from one of them
+
+  sut.correct(x, {now, far}, {before, before}, 2.0);
+
+  EXPECT_NEAR(x.q[2], 0.002, 1e-12);
 }
 
 TEST(PlanarUpdate, ProjectionMovesNoMoreThanItMust) {

@@ -90,7 +90,7 @@ StudyReport report(const PushStudy& study, const std::vector<PushRun>& runs) {
   result.table = fmt::format("{}\n\n{:<28}{:<9}{:<10}{:<16}{:<14}{:<18}{:<18}{}\n", study.title, "predictor", "threads",
                              "success", "95 % interval", "actions", "planning, s", "per plan, s", "completion, s");
   result.json = {{"title", study.title}, {"rows", nlohmann::json::array()}, {"runs", nlohmann::json::array()}};
-  Band band{.name = "mean and 95 % interval"};
+  Panel panel{.x_label = "predictors, in the legend's order", .y_label = "task completion, s"};
   const auto text = [](const Mean& mean, int digits) {
     return fmt::format("{:.{}f} ± {:.{}f}", mean.value, digits, mean.half_width, digits);
   };
@@ -115,19 +115,19 @@ StudyReport report(const PushStudy& study, const std::vector<PushRun>& runs) {
                                    {"seconds_per_plan", each.value},
                                    {"seconds_per_plan_half_width", each.half_width},
                                    {"completion_seconds", whole.value}});
-    band.x.push_back(static_cast<double>(band.x.size()));
-    band.low.push_back(whole.value - whole.half_width);
-    band.middle.push_back(whole.value);
-    band.high.push_back(whole.value + whole.half_width);
+    // A level each: predictors have an order in the legend, not on an axis.
+    const auto place = static_cast<double>(panel.bands.size());
+    const double low = whole.value - whole.half_width, high = whole.value + whole.half_width;
+    panel.bands.push_back({.name = fmt::format("{} x{}", cell.entry.predictor, cell.entry.threads),
+                           .x = {place + 0.1, place + 0.9},
+                           .low = {low, low},
+                           .middle = {whole.value, whole.value},
+                           .high = {high, high}});
   }
   result.table += "\nMeans over all runs, failed ones too, with 95 % intervals of the mean. Completion: planning, and an\n"
                   "action's duration for each action. The world stands still while its planner thinks.\n";
   if (!study.remark.empty()) result.table += study.remark + "\n";
-  std::string names;
-  for (std::size_t i = 0; i < study.entries.size(); ++i) {
-    names += fmt::format("{}{}: {} x{}", i == 0 ? "" : ",  ", i, study.entries[i].predictor, study.entries[i].threads);
-  }
-  result.panels = {{.x_label = names, .y_label = "task completion, s", .bands = {band}}};
+  result.panels = {panel};
   for (const PushRun& run : runs) {
     result.broken = result.broken || !run.error.empty();
     result.json["runs"].push_back({{"seed", run.seed},

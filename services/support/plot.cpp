@@ -21,7 +21,7 @@ constexpr std::array kColours{"#000000", "#E69F00", "#56B4E9", "#009E73",
                               "#D55E00", "#CC79A7", "#0072B2", "#999933"};
 
 // Pixels: a panel with its axis, and beside the last one the legend.
-constexpr int kPanelWidth = 700, kLegendWidth = 260, kHeight = 600, kFont = 14;
+constexpr int kPanelWidth = 700, kLegendWidth = 300, kHeight = 600, kFont = 14;
 constexpr int kAxis = 95, kGap = 20;  // left of a panel's frame and right of it
 
 // Parts of the height.

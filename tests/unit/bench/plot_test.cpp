@@ -56,7 +56,7 @@ TEST(Plot, DrawsAPng) {
   const std::string bytes = tests::contents(png);
   ASSERT_GT(bytes.size(), 10'000u);
   EXPECT_EQ(bytes.substr(1, 3), "PNG");
-  EXPECT_EQ(word(bytes, 16), 2 * 700u + 260u);  // two panels and the legend
+  EXPECT_EQ(word(bytes, 16), 2 * 700u + 300u);  // two panels and the legend
   EXPECT_EQ(word(bytes, 20), 600u);
 }
 

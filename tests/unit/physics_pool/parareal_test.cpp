@@ -331,6 +331,47 @@ TEST(PararealPool, RefusesWhatItCannotPredict) {
   EXPECT_THAT(no_pusher.error().message, HasSubstr("wanted pusher"));
 }
 
+// An engine that loses every slice that starts where `lost` says.
+class LosingPool final : public AsyncPool {
+ public:
+  explicit LosingPool(AsyncPool& engine) : engine_(engine) {}
+  Result<Hash> load(const Scene& scene) override { return engine_.load(scene); }
+  PoolStatus status() const override { return engine_.status(); }
+  Result<std::unique_ptr<Ticket>> submit(const RolloutBatch& batch, OnReply on_reply) override {
+    return engine_.submit(batch, [is_lost = lost(batch), reply = std::move(on_reply)](Result<BatchReply> result) {
+      if (result && is_lost) {
+        result->outcomes.front().end = End::kDiverged;
+        result->outcomes.front().reason = "told to diverge";
+      }
+      reply(std::move(result));
+    });
+  }
+  std::function<bool(const RolloutBatch&)> lost;
+
+ private:
+  AsyncPool& engine_;
+};
+
+TEST(PararealPool, SliceThatDivergesEndsItsSampleAndNoOther) {
+  const Scene scene = one_slider();
+  ThreadPool threads(2);
+  LosingPool losing(threads);
+  RolloutBatch batch = pushes(scene, {0.05, 0.0}, 3, 0.2, 3, 0.01);
+  const std::vector<double> second = sample_controls(batch.nominal, batch.law, 1).values;
+  losing.lost = [&](const RolloutBatch& slice) { return slice.nominal.values[0] == second[2]; };  // its step 1
+  PararealPool sut(losing, {.stop = {.iterations = 2}});
+  ASSERT_TRUE(sut.load(scene));
+
+  const auto reply_result = sut.run(batch, soon());
+
+  ASSERT_TRUE(reply_result) << reply_result.error().message;
+  EXPECT_EQ(reply_result->outcomes[0].end, End::kCompleted);
+  EXPECT_EQ(reply_result->outcomes[1].end, End::kDiverged);
+  EXPECT_THAT(reply_result->outcomes[1].reason, HasSubstr("told to diverge"));
+  EXPECT_EQ(reply_result->outcomes[1].cost, kInfinity);
+  EXPECT_EQ(reply_result->outcomes[2].end, End::kCompleted);
+}
+
 TEST(Split, OneSampleGoesAcrossTime) {
   const SplitProblem problem{.samples = 1, .steps = 4, .workers = 4, .iterations = 1, .coarse = 1e-6, .fine = 0.01};
   const Split split = choose_split(problem);

@@ -31,6 +31,18 @@ void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); 
 namespace jostle::physics_pool {
 namespace {
 
+TEST(AnalyticModelAllocation, NoneAfterConstruction) {
+  const Scene scene = tests::slider_scene(4);
+  for (const char* name : {"kinematic", "limit-surface", "planar"}) {
+    const auto sut = std::move(make_coarse_model(name, scene)).value();
+    std::vector<double> states(static_cast<std::size_t>(sut->layout().size())), controls{0.05, 0.01};
+    for (int i = 0; i < 4; ++i) states[static_cast<std::size_t>(sut->layout().pose(i))] = 0.08 + 0.1 * i;  // overlapping
+    const long before = allocations;
+    sut->advance(states, controls, 1.0);
+    EXPECT_EQ(allocations - before, 0) << name;
+  }
+}
+
 TEST(LearnedModelAllocation, NoneAfterConstructionForAnyBatch) {
   const auto sut = std::move(make_learned_model(tests::random_network(512), tests::slider_scene(4), "test")).value();
   const std::size_t size = static_cast<std::size_t>(sut->layout().size());

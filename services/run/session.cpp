@@ -26,19 +26,23 @@ std::filesystem::path program(const char* name) {
 Result<std::unique_ptr<Session>> Session::start(const RunOptions& options, Watcher watcher) {
   auto participant_result = dds::Participant::open({.name = "jostle_run", .domain = options.domain});
   if (!participant_result) return participant_result.error();
+  // Two that start at once would each hear the other's processes and take them for their own.
+  auto claim_result = DomainClaim::take("run", participant_result->domain(), std::chrono::seconds(1));
+  if (!claim_result) return claim_result.error();
   auto folder_result = make_temporary_folder("run");
   if (!folder_result) return folder_result.error();
   std::unique_ptr<Session> session(
-      new Session(options, std::move(watcher), *participant_result, *folder_result));
+      new Session(options, std::move(watcher), *participant_result, std::move(claim_result).value(), *folder_result));
   if (auto ok = session->start_processes(); !ok) return ok.error();
   return session;
 }
 
-Session::Session(const RunOptions& options, Watcher watcher, dds::Participant participant,
+Session::Session(const RunOptions& options, Watcher watcher, dds::Participant participant, DomainClaim claim,
                  std::filesystem::path folder)
     : options_(options),
       watcher_(std::move(watcher)),
       participant_(std::move(participant)),
+      claim_(std::move(claim)),
       folder_(std::move(folder)),
       goal_id_(folder_.filename().string()),
       goal_(participant_, topics::kTaskGoal),

@@ -17,6 +17,7 @@
 #include "services/dds/writer.hpp"
 #include "services/run/options.hpp"
 #include "services/support/child_process.hpp"
+#include "services/support/domain_claim.hpp"
 
 namespace jostle::services {
 
@@ -35,7 +36,8 @@ class Session {
     std::function<void(const std::string&)> on_notice;  ///< e.g. a worker was replaced
   };
 
-  /// Error kInvalidArgument, kNotFound, kUnavailable: nothing was started.
+  /// Error kInvalidArgument, kNotFound, kUnavailable: nothing was started; the last one
+  /// also when another run of this machine has the domain.
   static Result<std::unique_ptr<Session>> start(const RunOptions& options, Watcher watcher);
   ~Session();
 
@@ -47,7 +49,7 @@ class Session {
  private:
   using Clock = std::chrono::steady_clock;
 
-  Session(const RunOptions& options, Watcher watcher, dds::Participant participant,
+  Session(const RunOptions& options, Watcher watcher, dds::Participant participant, DomainClaim claim,
           std::filesystem::path folder);
 
   Result<void> start_processes();
@@ -61,6 +63,7 @@ class Session {
   const RunOptions& options_;
   Watcher watcher_;
   dds::Participant participant_;
+  DomainClaim claim_;
   std::filesystem::path folder_;  // for logs and the scene; removed at the end
   std::string goal_id_;
   bool sent_ = false;          // the goal

@@ -22,10 +22,15 @@ endfunction()
 # All programs, without the tests.
 add_custom_target(programs)
 
-# jostle_program(NAME SOURCES … LINK …): build/bin/jostle_NAME.
+# jostle_program(NAME SOURCES … LINK … [COMPONENT …]): build/bin/jostle_NAME. It is
+# installed beside the launcher, in the package of COMPONENT (jostle, see deploy/).
 function(jostle_program name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "" "COMPONENT" "SOURCES;LINK" ${ARGN})
   add_executable(jostle_${name} ${ARG_SOURCES})
   target_link_libraries(jostle_${name} PRIVATE jostle_flags ${ARG_LINK})
   add_dependencies(programs jostle_${name})
+  if(NOT ARG_COMPONENT)
+    set(ARG_COMPONENT jostle)
+  endif()
+  install(TARGETS jostle_${name} DESTINATION ${JOSTLE_PROGRAMS} COMPONENT ${ARG_COMPONENT})
 endfunction()

@@ -15,9 +15,16 @@ namespace fs = std::filesystem;
 
 fs::path program_folder() { return fs::read_symlink("/proc/self/exe").parent_path(); }
 
-fs::path data_file(const std::string& name) {
-  return program_folder().parent_path() / "share" / "jostle" / name;
+fs::path share_folder(const fs::path& programs) {
+  const fs::path beside = programs.parent_path() / "share" / "jostle";
+  std::error_code ignored;
+  for (fs::path prefix = programs.parent_path();; prefix = prefix.parent_path()) {
+    if (fs::is_directory(prefix / "share" / "jostle", ignored)) return prefix / "share" / "jostle";
+    if (prefix == prefix.parent_path()) return beside;  // the root: there is none
+  }
 }
+
+fs::path data_file(const std::string& name) { return share_folder(program_folder()) / name; }
 
 std::string coarse_model_name(const std::string& name) {
   return name == "learned" ? "learned:" + data_file("models/coarse-sliders.net").string() : name;

@@ -12,8 +12,14 @@ namespace jostle::services {
 /// The folder this program was started from, links resolved.
 std::filesystem::path program_folder();
 
-/// A data file of the project, `name` such as "experiments/chapter3.yaml":
-/// looked for below ../share/jostle of the program's folder.
+/// Where data of the programs in a folder lie: share/jostle of the nearest folder
+/// above that has one. Programs in build/bin find build/share/jostle, those in
+/// /usr/libexec/jostle find /usr/share/jostle. If there is none, the one that
+/// would lie beside, for a message to name.
+std::filesystem::path share_folder(const std::filesystem::path& programs);
+
+/// A data file of the project, `name` such as "experiments/chapter3.yaml", in the
+/// share folder of this program.
 std::filesystem::path data_file(const std::string& name);
 
 /// A coarse model's name for make_coarse_model: `learned` alone means the network that

@@ -70,10 +70,12 @@ void Executor::work(std::stop_token stop, int thread) {
     lock.unlock();
     BatchRun& run = *job.run;
     RolloutOutcome outcome{.sample = job.sample};
+    Shift shift{.thread = thread, .started = std::chrono::steady_clock::now()};
     if (!run.signals.is_obsolete(job.sample)) {
       outcome = run_rollout(dynamics.of(run.world, run.batch.fidelity), run.batch, job.sample, run.signals);
     }
-    run.on_outcome(std::move(outcome), thread);
+    shift.finished = std::chrono::steady_clock::now();
+    run.on_outcome(std::move(outcome), shift);
     job = {};
     lock.lock();
   }

@@ -315,6 +315,7 @@ void RemotePool::prepare_tasks(TimePoint now) {
     task.best_cost(active.best_cost);
     task.first_success(active.first_success);
     task.samples(assignment.samples);
+    task.sent(std::chrono::nanoseconds(now.time_since_epoch()).count());
     outgoing_.tasks.emplace_back(assignment.worker, std::move(task));
   }
 }

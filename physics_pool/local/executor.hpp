@@ -36,7 +36,9 @@ using BatchRunPtr = std::shared_ptr<BatchRun>;
 
 class Executor {
  public:
-  explicit Executor(int threads);
+  /// `cores`: thread i stays on cores[i], if there are any; else the system chooses.
+  /// Throws std::system_error when this process may not use one of them.
+  explicit Executor(int threads, const std::vector<int>& cores = {});
   /// Skips what is queued and waits for what runs (a millisecond once its
   /// signals are cancelled; a whole rollout otherwise).
   ~Executor();

@@ -241,11 +241,14 @@ void RemotePool::absorb_heartbeats(TimePoint now, std::vector<WorkerId>& strange
       return load.client();
     });
     const bool hears_us = us != heartbeat.clients().end();
+    std::uint64_t others = 0;
+    for (const msg::ClientLoad& load : heartbeat.clients()) others += load.client() == client_ ? 0 : load.samples();
     scheduler_.heard({.worker = heartbeat.worker(),
                       .name = heartbeat.name(),
                       .capacity = static_cast<int>(std::min<std::uint32_t>(heartbeat.capacity(), INT32_MAX)),
                       .ready = hears_us && writer != task_writers_.end() && writer->second.matched() > 0,
-                      .samples = hears_us ? us->samples() : 0},
+                      .samples = hears_us ? us->samples() : 0,
+                      .others = others},
                      now);
     ever_heard_ = true;
     changed_.notify_all();

@@ -18,6 +18,7 @@ void Scheduler::heard(const WorkerNews& news, TimePoint now) {
   worker.status.name = news.name;
   worker.status.alive = news.capacity > 0;
   worker.ready = news.ready;
+  worker.others = news.others;
   worker.last_heard = now;
   if (!worker.status.alive) return take_back(worker, now);
   worker.status.capacity = std::clamp(news.capacity, 1, kLargestCapacity);
@@ -234,7 +235,7 @@ std::vector<Assignment> Scheduler::assign(TimePoint now) {
   }
   for (auto& [id, worker] : workers_) {
     while (usable(worker, now) &&
-           static_cast<int>(worker.outstanding.size()) < worker.status.capacity &&
+           worker.outstanding.size() + worker.others < static_cast<std::size_t>(worker.status.capacity) &&
            next_copy(worker, now, choice)) {
       give(id, worker, choice, now, assignments);
     }

@@ -33,6 +33,7 @@ struct WorkerNews {
   int capacity = 1;           ///< rollouts at a time; 0: it takes its leave
   bool ready = false;         ///< it hears us, and we hear it
   std::uint32_t samples = 0;  ///< of ours, queued or running there
+  std::uint64_t others = 0;   ///< of other clients' there
 };
 
 struct SchedulerOptions {
@@ -57,7 +58,8 @@ struct SchedulerOptions {
 ///   that no thread waits for the network between two of them
 ///   samples of the dead go back to the queue
 ///   when the queue is empty, idle workers get a second copy of samples that
-///   wait behind others first, then of those outstanding longest
+///   wait behind others first, then of those outstanding longest; a worker that
+///   has enough to do for other clients is not idle
 ///
 /// Threads  one at a time.
 class Scheduler {
@@ -97,6 +99,7 @@ class Scheduler {
   struct Worker {
     physics_pool::WorkerStatus status;
     bool ready = false;
+    std::uint64_t others = 0;              // other clients' samples, at the last heartbeat
     TimePoint last_heard;
     TimePoint benched_until;
     int empty_heartbeats = 0;             // in a row, though samples are outstanding

@@ -60,7 +60,7 @@ WorkerService::WorkerService(const dds::Participant& participant, const WorkerOp
       threads_(std::max(options.threads, 1)),
       result_writer_(participant, topics::kPoolResult),
       heartbeat_writer_(participant, topics::kPoolWorker),
-      executor_(threads_),
+      executor_(threads_, options.cores),
       world_reader_(participant, topics::kPoolWorld,
                     [this](const msg::WorldDescription& world) {
                       worlds_.announce({.high = world.high(), .low = world.low()}, world.scene());

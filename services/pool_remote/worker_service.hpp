@@ -23,6 +23,7 @@ namespace jostle::services {
 struct WorkerOptions {
   std::string name;  ///< as clients report it; empty: host and process id
   int threads = 1;   ///< rollouts at a time; one per core is enough
+  std::vector<int> cores;  ///< of each simulating thread; empty: wherever the system likes
 };
 
 /// Takes tasks, runs their samples, answers each. Clients and priorities share the

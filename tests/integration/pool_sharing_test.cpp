@@ -69,6 +69,7 @@ class PoolSharing : public ::testing::Test {
       const auto samples = static_cast<double>(clients[i].rollouts() - before[i]);
       served.push_back(samples * std::chrono::duration<double>(lengths[i]).count());
     }
+    for (std::size_t i = 0; i < served.size(); ++i) RecordProperty("served_" + std::to_string(i), std::to_string(served[i]));
     stop.request_stop();
     for (auto& reply : endless) EXPECT_EQ(reply.get().error().code, Code::kCancelled);
     return served;

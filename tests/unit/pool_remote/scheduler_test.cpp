@@ -149,6 +149,36 @@ TEST_F(SchedulerTest, IdleWorkerCopiesWaitingSamplesFirst) {
   EXPECT_THAT(assigned_to(kBert), ElementsAre(0));
 }
 
+TEST_F(SchedulerTest, WorkerBusyWithOthersGetsNoCopies) {
+  hear(kAnna);
+  sut.start(kBatch, 0, 2);
+  sut.assign(now);
+  now += options.copy_after;
+  sut.heard({.worker = kBert, .name = "w", .capacity = 2, .ready = true, .others = 2}, now);
+  EXPECT_THAT(sut.assign(now), IsEmpty());
+
+  sut.heard({.worker = kBert, .name = "w", .capacity = 2, .ready = true, .others = 1}, now);
+
+  EXPECT_THAT(assigned_to(kBert), ElementsAre(1));
+}
+
+TEST_F(SchedulerTest, WaitsForASampleThatItsWorkerHasNoTurnFor) {
+  hear(kAnna);
+  hear(kBert);
+  sut.start(kBatch, 0, 2);
+  sut.assign(now);
+  for (int i = 0; i < 100; ++i) {  // ten seconds of others' urgent work
+    now += 100ms;
+    for (const WorkerId worker : {kAnna, kBert}) {
+      sut.heard({.worker = worker, .name = "w", .capacity = 1, .ready = true, .samples = 1, .others = 2}, now);
+    }
+    EXPECT_THAT(sut.check_silence(now), IsEmpty());
+    EXPECT_THAT(sut.assign(now), IsEmpty());
+  }
+  EXPECT_TRUE(accept(kAnna, 0));
+  EXPECT_EQ(sut.status().reissued, 0u);
+}
+
 TEST_F(SchedulerTest, NoSampleHasThreeCopies) {
   hear(kAnna);
   sut.start(kBatch, 0, 1);

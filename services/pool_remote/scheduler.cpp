@@ -243,6 +243,11 @@ std::vector<Assignment> Scheduler::assign(TimePoint now) {
   return assignments;
 }
 
+std::string Scheduler::name_of(WorkerId worker) const {
+  const auto found = workers_.find(worker);
+  return found == workers_.end() ? "" : found->second.status.name;
+}
+
 physics_pool::PoolStatus Scheduler::status() const {
   physics_pool::PoolStatus status{.reissued = reissued_, .duplicates = duplicates_};
   for (const auto& [id, worker] : workers_) status.workers.push_back(worker.status);

@@ -89,6 +89,7 @@ class Scheduler {
   std::vector<Assignment> assign(TimePoint now);
 
   physics_pool::PoolStatus status() const;
+  std::string name_of(WorkerId worker) const;  ///< empty if it is not known
 
  private:
   struct Outstanding {

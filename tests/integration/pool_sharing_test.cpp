@@ -22,7 +22,8 @@ using services::RemotePool;
 constexpr auto kPatience = 60s;
 
 struct Client {
-  explicit Client(int domain) : participant(dds::Participant::open({.domain = domain}).value()), pool(participant) {}
+  explicit Client(int domain, const services::RemotePoolOptions& options = {})
+      : participant(dds::Participant::open({.domain = domain}).value()), pool(participant, options) {}
 
   std::uint64_t rollouts() const {
     const auto workers = pool.status().workers;
@@ -138,6 +139,34 @@ TEST_F(PoolSharing, BatchThatHasToWaitIsNeitherReissuedNorCopied) {
   stop.request_stop();
   EXPECT_EQ(endless.get().error().code, Code::kCancelled);
   expect_nothing_was_lost_or_copied();
+}
+
+TEST_F(PoolSharing, EverySampleIsTracedFromSendingToReceiving) {
+  start(2, 0);
+  std::vector<services::SampleTrace> traces;  // complete when run() returns
+  Client client(domain, {.on_sample = [&](const services::SampleTrace& trace) { traces.push_back(trace); }});
+  ASSERT_TRUE(client.pool.load(scene));
+  ASSERT_TRUE(client.pool.wait_for_workers(2, in(kPatience)));
+
+  ASSERT_TRUE(client.pool.run(wait_batch(scene, 20, 5ms), in(kPatience)));
+
+  std::map<std::uint32_t, int> firsts;
+  for (const services::SampleTrace& trace : traces) {
+    firsts[trace.sample] += trace.first;
+    EXPECT_EQ(trace.client, client.participant.id());
+    EXPECT_EQ(trace.thread, 0u);
+    // One machine, one clock: everything in its order.
+    EXPECT_LE(trace.sent, trace.arrived);
+    EXPECT_LE(trace.arrived, trace.started);
+    EXPECT_GE(trace.finished - trace.started, 0.005);
+    EXPECT_LE(trace.finished, trace.received);
+  }
+  EXPECT_EQ(firsts.size(), 20u);
+  for (const auto& [sample, count] : firsts) EXPECT_EQ(count, 1) << sample;
+  const services::Timeline timeline = services::timeline_of(traces, client.pool.status().workers);
+  EXPECT_EQ(timeline.rows.size(), 2u);
+  EXPECT_GT(timeline.efficiency, 0.3);
+  EXPECT_LT(timeline.clock_error, 0.05);
 }
 
 }  // namespace

@@ -303,7 +303,9 @@ void RemotePool::absorb(const Received& received, TimePoint now) {
     scheduler_.bench(result.worker(), now);
     return;
   }
-  const bool first = scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps(), now);
+  const bool first = scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps(), now,
+                                       std::chrono::duration<double>(1e-9 * (static_cast<double>(result.finished()) -
+                                                                             static_cast<double>(result.started()))));
   trace(received, first);
   if (!first) return;
   adopt(*active, std::move(outcome_result).value());

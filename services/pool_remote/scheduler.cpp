@@ -1,12 +1,16 @@
 #include "services/pool_remote/scheduler.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace jostle::services {
 namespace {
 
 constexpr int kLargestCapacity = 1024;  // threads of one process; more is a broken heartbeat
 constexpr int kSpare = 1;               // samples a worker holds beyond what it can run
+constexpr double kNews = 0.1;           // weight of one more in what is typical
+constexpr std::chrono::duration<double> kCover{0.004};  // an exchange with a worker on a busy machine
+constexpr double kMostCover = 16.0;     // samples per thread, however short
 constexpr std::uint8_t kCopies = 2;     // of one sample at a time
 constexpr double kSlow = 2.0;           // times the typical time: worth a copy
 constexpr int kEmptyHeartbeats = 2;     // the first may have crossed a task on its way
@@ -78,7 +82,9 @@ std::uint32_t Scheduler::missing(Epoch epoch) const {
   return found == batches_.end() ? 0 : found->second.missing;
 }
 
-bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now) {
+bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now,
+                       std::chrono::duration<double> ran) {
+  if (ran.count() > 0) typical_run_ += (typical_run_.count() > 0 ? kNews : 1.0) * (ran - typical_run_);
   const auto worker = workers_.find(id);
   if (worker != workers_.end()) {
     auto& outstanding = worker->second.outstanding;
@@ -86,7 +92,6 @@ bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint
       return candidate.epoch == epoch && candidate.sample == sample;
     });
     if (entry != outstanding.end()) {
-      constexpr double kNews = 0.1;  // weight of one more
       typical_ += kNews * (now - entry->since - typical_);
       release(*entry);
       outstanding.erase(entry);
@@ -148,6 +153,13 @@ void Scheduler::take_back(Worker& worker, TimePoint sent_before) {
   });
 }
 
+// Samples that a worker may hold.
+int Scheduler::room(const Worker& worker) const {
+  if (worker.others == 0 || typical_run_.count() <= 0) return worker.status.capacity + kSpare;
+  const double cover = std::clamp(std::ceil(kCover / typical_run_), 1.0, kMostCover);
+  return worker.status.capacity * static_cast<int>(cover) + kSpare;
+}
+
 // The usable worker with the emptiest hands, relative to its size.
 std::pair<const WorkerId, Scheduler::Worker>* Scheduler::least_loaded(TimePoint now) {
   std::pair<const WorkerId, Worker>* best = nullptr;
@@ -155,7 +167,7 @@ std::pair<const WorkerId, Scheduler::Worker>* Scheduler::least_loaded(TimePoint 
   for (auto& entry : workers_) {
     const Worker& worker = entry.second;
     const auto held = static_cast<int>(worker.outstanding.size());
-    if (!usable(worker, now) || held >= worker.status.capacity + kSpare) continue;
+    if (!usable(worker, now) || held >= room(worker)) continue;
     const double load = static_cast<double>(held) / worker.status.capacity;
     if (best && load >= least) continue;
     best = &entry;

@@ -56,6 +56,9 @@ struct SchedulerOptions {
 ///   lowest sample first; batches take turns
 ///   a worker holds at most capacity + 1 samples: one more than it can run, so
 ///   that no thread waits for the network between two of them
+///   where others use the worker too, and samples are shorter than messages may
+///   take, it holds as many as last that long: who has nothing there when a thread
+///   is free loses the turn
 ///   samples of the dead go back to the queue
 ///   when the queue is empty, idle workers get a second copy of samples that
 ///   wait behind others first, then of those outstanding longest; a worker that
@@ -80,8 +83,9 @@ class Scheduler {
   std::uint32_t missing(Epoch epoch) const;
 
   /// A sample came back. True when it is the first result of that sample;
-  /// otherwise it is late or a duplicate, and counted.
-  bool accept(WorkerId worker, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now);
+  /// otherwise it is late or a duplicate, and counted. `ran`: for how long, if known.
+  bool accept(WorkerId worker, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now,
+              std::chrono::duration<double> ran = {});
   /// Samples above this one are no longer wanted.
   void drop_above(Epoch epoch, std::uint32_t sample);
 
@@ -125,6 +129,7 @@ class Scheduler {
   };
 
   bool usable(const Worker& worker, TimePoint now) const;
+  int room(const Worker& worker) const;
   void take_back(Worker& worker, TimePoint sent_before);
   void release(const Outstanding& outstanding);
   std::pair<const WorkerId, Worker>* least_loaded(TimePoint now);
@@ -138,6 +143,7 @@ class Scheduler {
   std::map<Epoch, Batch> batches_;
   Epoch last_served_ = 0;
   std::chrono::duration<double> typical_{0.0};  // from handing out to coming back, lately
+  std::chrono::duration<double> typical_run_{0.0};  // of a sample, lately; 0: not known
   std::uint64_t reissued_ = 0;
   std::uint64_t duplicates_ = 0;
 };

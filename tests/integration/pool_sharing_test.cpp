@@ -101,6 +101,12 @@ TEST_F(PoolSharing, ShortSamplesGetAsMuchTimeAsLongOnes) {
   EXPECT_NEAR(1.2 / (served + 1.2), 0.5, 0.12);
 }
 
+TEST_F(PoolSharing, SamplesShorterThanAnExchangeGetTheirTimeToo) {
+  start(2, 2);
+  const double served = served_meanwhile({60ms}, wait_batch(scene, 1000, 500us)).front();
+  EXPECT_GE(0.5 / (served + 0.5), 0.25);  // a pause of 0.5 ms takes longer, and is charged so
+}
+
 TEST_F(PoolSharing, LongSamplesGetAsMuchTimeAsShortOnes) {
   start(2, 2);
   const double served = served_meanwhile({5ms}, wait_batch(scene, 20, 60ms)).front();

@@ -149,6 +149,29 @@ TEST_F(SchedulerTest, IdleWorkerCopiesWaitingSamplesFirst) {
   EXPECT_THAT(assigned_to(kBert), ElementsAre(0));
 }
 
+TEST_F(SchedulerTest, GivesMoreOfShortSamplesWhereOthersTakeTurns) {
+  hear(kAnna);
+  sut.start(kBatch, 0, 100);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(0, 1));
+  sut.accept(kAnna, kBatch, 0, 100, now, 1ms);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(2)) << "nobody else is there";
+
+  sut.heard({.worker = kAnna, .name = "w", .capacity = 1, .ready = true, .samples = 2, .others = 1}, now);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(3, 4, 5)) << "five of 1 ms outlast an exchange";
+
+  sut.heard({.worker = kAnna, .name = "w", .capacity = 1, .ready = true, .samples = 5, .others = 0}, now);
+  accept(kAnna, 1);
+  EXPECT_THAT(assigned_to(kAnna), IsEmpty());
+}
+
+TEST_F(SchedulerTest, GivesNoMoreOfLongSamplesWhereOthersTakeTurns) {
+  sut.heard({.worker = kAnna, .name = "w", .capacity = 2, .ready = true, .others = 5}, now);
+  sut.start(kBatch, 0, 100);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(0, 1, 2));
+  sut.accept(kAnna, kBatch, 0, 100, now, 60ms);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(3));
+}
+
 TEST_F(SchedulerTest, WorkerBusyWithOthersGetsNoCopies) {
   hear(kAnna);
   sut.start(kBatch, 0, 2);

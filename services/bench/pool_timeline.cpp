@@ -35,13 +35,18 @@ class Recorder {
     const std::lock_guard lock(mutex_);
     traces_.push_back(trace);
   }
-  std::vector<SampleTrace> take() {
+  // Of samples sent from then on: a copy may come back after its batch is over.
+  std::vector<SampleTrace> since(std::chrono::steady_clock::time_point then) const {
     const std::lock_guard lock(mutex_);
-    return std::exchange(traces_, {});
+    std::vector<SampleTrace> traces = traces_;
+    std::erase_if(traces, [&](const SampleTrace& trace) {
+      return trace.sent < std::chrono::duration<double>(then.time_since_epoch()).count();
+    });
+    return traces;
   }
 
  private:
-  std::mutex mutex_;  // guards traces_
+  mutable std::mutex mutex_;  // guards traces_
   std::vector<SampleTrace> traces_;
 };
 
@@ -192,10 +197,10 @@ Result<void> bench_pool(const PoolTimelineOptions& options) {
   }
   if (options.urgent) batches.back().priority = physics_pool::Priority::kUrgent;
   if (auto ok = run_all(pools, batches, 1, options.stop); !ok) return ok;  // worlds are compiled, caches warm
-  recorder.take();
+  const auto start = std::chrono::steady_clock::now();
   if (auto ok = run_all(pools, batches, options.batches, options.stop); !ok) return ok;
 
-  const Timeline timeline = timeline_of(recorder.take(), pools.front()->status().workers);
+  const Timeline timeline = timeline_of(recorder.since(start), pools.front()->status().workers);
   const Legend legend = legend_of(timeline, ids, batches);
   const std::string title = headline(timeline, options);
   print(timeline, title);

@@ -158,7 +158,7 @@ Result<std::unique_ptr<physics_pool::AsyncPool::Ticket>> RemotePool::submit(cons
     active->reply.outcomes[i].sample = batch.first_sample + i;
   }
   active_[active->epoch] = active;
-  scheduler_.start(active->epoch, batch.first_sample, batch.samples);
+  scheduler_.start(active->epoch, batch.first_sample, batch.samples, batch.priority);
   kick();
   return std::unique_ptr<Ticket>(std::make_unique<Underway>(*this, active));
 }

@@ -4,6 +4,9 @@
 #include <cmath>
 
 namespace jostle::services {
+
+using physics_pool::Priority;
+
 namespace {
 
 constexpr int kLargestCapacity = 1024;  // threads of one process; more is a broken heartbeat
@@ -11,6 +14,7 @@ constexpr int kSpare = 1;               // samples a worker holds beyond what it
 constexpr double kNews = 0.1;           // weight of one more in what is typical
 constexpr std::chrono::duration<double> kCover{0.004};  // an exchange with a worker on a busy machine
 constexpr double kMostCover = 16.0;     // samples per thread, however short
+constexpr std::uint64_t kUrgentInARow = 7;  // samples, while a normal batch has some to hand out
 constexpr std::uint8_t kCopies = 2;     // of one sample at a time
 constexpr double kSlow = 2.0;           // times the typical time: worth a copy
 constexpr int kEmptyHeartbeats = 2;     // the first may have crossed a task on its way
@@ -62,8 +66,9 @@ int Scheduler::usable_workers(TimePoint now) const {
       std::ranges::count_if(workers_, [&](const auto& entry) { return usable(entry.second, now); }));
 }
 
-void Scheduler::start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples) {
-  batches_[epoch] = {.first_sample = first_sample,
+void Scheduler::start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples, Priority priority) {
+  batches_[epoch] = {.priority = priority,
+                     .first_sample = first_sample,
                      .samples = std::vector<Sample>(samples),
                      .missing = samples};
 }
@@ -177,10 +182,25 @@ std::pair<const WorkerId, Scheduler::Worker>* Scheduler::least_loaded(TimePoint 
 }
 
 bool Scheduler::next_sample(Choice& choice) {
+  const bool normal_first = urgent_in_a_row_ >= kUrgentInARow;
+  if (normal_first && next_sample_of(Priority::kNormal, choice)) {
+    urgent_in_a_row_ = 0;
+    return true;
+  }
+  if (next_sample_of(Priority::kUrgent, choice)) {
+    ++urgent_in_a_row_;
+    return true;
+  }
+  urgent_in_a_row_ = 0;
+  return !normal_first && next_sample_of(Priority::kNormal, choice);
+}
+
+bool Scheduler::next_sample_of(Priority priority, Choice& choice) {
   auto batch = batches_.upper_bound(last_served_);
   for (std::size_t i = 0; i < batches_.size(); ++i, ++batch) {
     if (batch == batches_.end()) batch = batches_.begin();
     auto& [epoch, content] = *batch;
+    if (content.priority != priority) continue;
     while (content.next < content.samples.size() && content.samples[content.next].done) ++content.next;
     std::uint32_t index = content.next;
     if (!content.returned.empty() && *content.returned.begin() < index) {

@@ -53,7 +53,8 @@ struct SchedulerOptions {
 };
 
 /// Rules
-///   lowest sample first; batches take turns
+///   lowest sample first; batches of equal priority take turns, urgent ones go
+///   first, and every eighth sample is a normal one's while there are both
 ///   a worker holds at most capacity + 1 samples: one more than it can run, so
 ///   that no thread waits for the network between two of them
 ///   where others use the worker too, and samples are shorter than messages may
@@ -77,7 +78,8 @@ class Scheduler {
   int usable_workers(TimePoint now) const;
 
   /// Batches.
-  void start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples);
+  void start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples,
+             physics_pool::Priority priority = physics_pool::Priority::kNormal);
   /// Forgets a batch; true when workers still hold samples of it.
   bool finish(Epoch epoch);
   std::uint32_t missing(Epoch epoch) const;
@@ -116,6 +118,7 @@ class Scheduler {
     std::uint32_t attempts = 0;  // handed out ever
   };
   struct Batch {
+    physics_pool::Priority priority = physics_pool::Priority::kNormal;
     std::uint32_t first_sample = 0;
     std::vector<Sample> samples;
     std::uint32_t next = 0;               // index of the lowest never handed out
@@ -134,6 +137,7 @@ class Scheduler {
   void release(const Outstanding& outstanding);
   std::pair<const WorkerId, Worker>* least_loaded(TimePoint now);
   bool next_sample(Choice& choice);
+  bool next_sample_of(physics_pool::Priority priority, Choice& choice);
   bool next_copy(const Worker& worker, TimePoint now, Choice& choice) const;
   void give(WorkerId id, Worker& worker, const Choice& choice, TimePoint now,
             std::vector<Assignment>& assignments);
@@ -142,6 +146,7 @@ class Scheduler {
   std::map<WorkerId, Worker> workers_;
   std::map<Epoch, Batch> batches_;
   Epoch last_served_ = 0;
+  std::uint64_t urgent_in_a_row_ = 0;  // samples handed out
   std::chrono::duration<double> typical_{0.0};  // from handing out to coming back, lately
   std::chrono::duration<double> typical_run_{0.0};  // of a sample, lately; 0: not known
   std::uint64_t reissued_ = 0;

@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <map>
+
 namespace jostle::tests {
 namespace {
 
@@ -239,6 +241,24 @@ TEST_F(SchedulerTest, BatchesTakeTurns) {
   ASSERT_THAT(assignments, SizeIs(2));
   EXPECT_THAT(assignments[0].samples, SizeIs(2));
   EXPECT_THAT(assignments[1].samples, SizeIs(2));
+}
+
+TEST_F(SchedulerTest, UrgentBatchGoesFirstAndTheNormalOneKeepsAnEighth) {
+  hear(kAnna, 15);
+  sut.start(kBatch, 0, 100);
+  sut.start(kOther, 0, 100, physics_pool::Priority::kUrgent);
+
+  std::map<Epoch, std::size_t> handed_out;
+  for (const Assignment& assignment : sut.assign(now)) handed_out[assignment.epoch] += assignment.samples.size();
+
+  EXPECT_EQ(handed_out[kBatch], 2u);
+  EXPECT_EQ(handed_out[kOther], 14u);
+}
+
+TEST_F(SchedulerTest, UrgentBatchAloneGetsEverything) {
+  hear(kAnna, 15);
+  sut.start(kOther, 0, 100, physics_pool::Priority::kUrgent);
+  EXPECT_THAT(assigned_to(kAnna), SizeIs(16));
 }
 
 TEST_F(SchedulerTest, FinishedBatchFreesItsWorkers) {

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-
 #include <future>
 
 #include "physics_pool/local/thread_pool.hpp"

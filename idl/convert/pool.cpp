@@ -121,6 +121,7 @@ msg::BatchDescription to_wire(const RolloutBatch& batch) {
   wire.want_all_trajectories(batch.want_all_trajectories);
   wire.freeze(batch.fidelity.freeze);
   wire.time_step(batch.fidelity.time_step);
+  wire.priority(static_cast<std::uint8_t>(batch.priority));
   wire.wait(batch.wait ? batch.wait->count() : kSimulate);
   return wire;
 }
@@ -149,6 +150,7 @@ RolloutBatch from_wire(const msg::BatchDescription& wire) {
   batch.min_steps = wire.min_steps();
   batch.want_all_trajectories = wire.want_all_trajectories();
   batch.fidelity = {.freeze = wire.freeze(), .time_step = wire.time_step()};
+  batch.priority = static_cast<physics_pool::Priority>(wire.priority());  // any octet: validate judges
   if (wire.wait() != kSimulate) batch.wait = std::chrono::nanoseconds(wire.wait());
   return batch;
 }

@@ -40,7 +40,8 @@ struct PoolStatus {
 ///   J      = w_g·c_g(x[n]) + sum_t (w_a·c_a + w_d·c_d + w_e·c_e + topple + drop)
 ///
 /// Source   Eq. 3.1, 3.2 and lines 3-9 of Alg. 1.
-/// Threads  safe from any thread; batches share the workers.
+/// Threads  safe from any thread; batches share the workers. Where clients share them
+///          too, they share by RolloutBatch::priority and, within one, by time.
 /// Time     `run` returns by the deadline at the latest, finished or not, and
 ///          within milliseconds of a stop request.
 /// Repeats  the winner, its cost, controls and trajectory are bit-equal for any

@@ -122,6 +122,9 @@ Result<void> validate(const RolloutBatch& batch) {
   if (batch.wait && (*batch.wait < batch.wait->zero() || *batch.wait > kMaxWait)) {
     return wrong("wait", fmt::format("{} ns", batch.wait->count()), "0 to 10 s");
   }
+  if (batch.priority > Priority::kUrgent) {
+    return wrong("priority", std::to_string(static_cast<int>(batch.priority)), "0 (normal) or 1 (urgent)");
+  }
   if (auto ok = check_size("u_before", batch.u_before.size(), nu); !ok) return ok;
   if (batch.law.sigma.size() != batch.nominal.values.size()) {
     if (auto ok = check_size("law.sigma", batch.law.sigma.size(), nu); !ok) return ok;

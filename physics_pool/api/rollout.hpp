@@ -61,6 +61,13 @@ struct Fidelity {
   bool operator==(const Fidelity&) const = default;
 };
 
+/// Whose rollouts run first where several clients share workers. It changes when a
+/// batch is done, never what comes out.
+enum class Priority : std::uint8_t {
+  kNormal = 0,
+  kUrgent = 1,  ///< a robot waits for it
+};
+
 /// K rollouts of n control steps from one state.
 struct RolloutBatch {
   Hash world;                   ///< of a scene given to Pool::load
@@ -81,6 +88,7 @@ struct RolloutBatch {
   int min_steps = 0;             ///< n_min: success counts from this control step (0-based) on
   bool want_all_trajectories = false;
   Fidelity fidelity;
+  Priority priority = Priority::kNormal;
   /// Scheduling studies only: wait this long per rollout and simulate nothing.
   std::optional<std::chrono::nanoseconds> wait;
 };

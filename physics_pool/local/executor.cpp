@@ -1,6 +1,10 @@
 #include "physics_pool/local/executor.hpp"
 
+#include <pthread.h>
+
 #include <algorithm>
+#include <string>
+#include <system_error>
 
 #include "physics_pool/local/reduced_simulator.hpp"
 #include "physics_pool/local/simulator.hpp"
@@ -40,11 +44,21 @@ class DynamicsCache {
   std::vector<Entry> cache_;
 };
 
+void pin(std::jthread& thread, int core) {
+  cpu_set_t only;
+  CPU_ZERO(&only);
+  CPU_SET(core, &only);
+  if (const int problem = pthread_setaffinity_np(thread.native_handle(), sizeof only, &only)) {
+    throw std::system_error(problem, std::generic_category(), "core " + std::to_string(core));
+  }
+}
+
 }  // namespace
 
-Executor::Executor(int threads) {
+Executor::Executor(int threads, const std::vector<int>& cores) {
   for (int i = 0; i < std::max(threads, 1); ++i) {
     threads_.emplace_back([this, i](std::stop_token stop) { work(stop, i); });
+    if (i < static_cast<int>(cores.size())) pin(threads_.back(), cores[static_cast<std::size_t>(i)]);
   }
 }
 
@@ -70,10 +84,12 @@ void Executor::work(std::stop_token stop, int thread) {
     lock.unlock();
     BatchRun& run = *job.run;
     RolloutOutcome outcome{.sample = job.sample};
+    Shift shift{.thread = thread, .started = std::chrono::steady_clock::now()};
     if (!run.signals.is_obsolete(job.sample)) {
       outcome = run_rollout(dynamics.of(run.world, run.batch.fidelity), run.batch, job.sample, run.signals);
     }
-    run.on_outcome(std::move(outcome), thread);
+    shift.finished = std::chrono::steady_clock::now();
+    run.on_outcome(std::move(outcome), shift);
     job = {};
     lock.lock();
   }

@@ -3,6 +3,7 @@
 /// Threads that run rollouts, one at a time each, in the order they arrive.
 /// The in-process pool and the worker process both stand on it.
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -15,21 +16,29 @@
 
 namespace jostle::physics_pool {
 
+/// Where and when a sample ran.
+struct Shift {
+  int thread = 0;  ///< from 0
+  std::chrono::steady_clock::time_point started, finished;
+};
+
 /// A batch on its way: what its rollouts read and whom they tell.
 struct BatchRun {
   RolloutBatch batch;
   WorldPtr world;
   BatchSignals signals;
   /// Called once for every submitted sample, on the thread that ran it (or
-  /// skipped it); must be quick and must not throw. `thread` counts from 0.
-  std::function<void(RolloutOutcome, int thread)> on_outcome;
+  /// skipped it); must be quick and must not throw. It may submit more.
+  std::function<void(RolloutOutcome, const Shift&)> on_outcome;
 };
 /// Shared by the submitter and every queued sample; the last one drops it.
 using BatchRunPtr = std::shared_ptr<BatchRun>;
 
 class Executor {
  public:
-  explicit Executor(int threads);
+  /// `cores`: thread i stays on cores[i], if there are any; else the system chooses.
+  /// Throws std::system_error when this process may not use one of them.
+  explicit Executor(int threads, const std::vector<int>& cores = {});
   /// Skips what is queued and waits for what runs (a millisecond once its
   /// signals are cancelled; a whole rollout otherwise).
   ~Executor();

@@ -89,11 +89,11 @@ Result<std::unique_ptr<AsyncPool::Ticket>> ThreadPool::submit(const RolloutBatch
   }
   run->batch = batch;
   auto running = std::make_unique<Running>(run, std::move(on_reply));
-  run->on_outcome = [this, receive = running->receiver()](RolloutOutcome outcome, int thread) {
+  run->on_outcome = [this, receive = running->receiver()](RolloutOutcome outcome, const Shift& shift) {
     {
       const std::lock_guard lock(mutex_);
-      workers_[static_cast<std::size_t>(thread)].rollouts += 1;
-      workers_[static_cast<std::size_t>(thread)].engine_steps += outcome.engine_steps;
+      workers_[static_cast<std::size_t>(shift.thread)].rollouts += 1;
+      workers_[static_cast<std::size_t>(shift.thread)].engine_steps += outcome.engine_steps;
     }
     receive(std::move(outcome));
   };

@@ -15,7 +15,8 @@ RolloutBatch slice_batch(const RolloutBatch& of, const State& start, std::span<c
           .objective = of.objective,
           .stop_losers = false,
           .want_all_trajectories = true,
-          .fidelity = of.fidelity};
+          .fidelity = of.fidelity,
+          .priority = of.priority};
 }
 
 Result<std::vector<Trajectory>> predict_levels(Pool& pool, const RolloutBatch& batch, const PlanarUpdate& update,

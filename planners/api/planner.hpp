@@ -25,6 +25,7 @@ struct Problem {
   std::uint64_t seed = 0;
   std::uint32_t stream = 0; ///< first noise stream; one is used per iteration
   bool clear_hand = false;  ///< let Objective::obstruction count
+  physics_pool::Priority priority = physics_pool::Priority::kNormal;  ///< of its rollouts; changes no plan
 };
 
 /// The best sequence found, even if it does not reach the goal.

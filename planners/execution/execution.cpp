@@ -43,7 +43,10 @@ Result<void> Execution::plan(const ControlSequence& initial, int iterations, boo
                   .iterations = iterations,
                   .seed = setup_.seed,
                   .stream = stream_,
-                  .clear_hand = clear_hand};
+                  .clear_hand = clear_hand,
+                  // From the first action on a robot stands still for as long as this takes.
+                  .priority = outcome_.actions > 0 ? physics_pool::Priority::kUrgent
+                                                   : physics_pool::Priority::kNormal};
   auto plan_result = setup_.planner.plan(problem, deadline_, stop_);
   if (!plan_result) return plan_result.error();
   plan_ = std::move(plan_result).value();

@@ -27,6 +27,7 @@ Search::Search(physics_pool::Pool& pool, const Problem& problem, RolloutBatch pa
   pattern_.law.seed = problem.seed;
   if (!problem.clear_hand) pattern_.objective.obstruction = 0.0;
   pattern_.stop_on_success = true;
+  pattern_.priority = problem.priority;
   best_.controls = problem.initial;
   best_.states = {problem.x0};
 }

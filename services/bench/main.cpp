@@ -9,6 +9,8 @@
 
 #include "services/bench/benchmarks.hpp"
 #include "services/bench/cheap_physics.hpp"
+#include "services/bench/pool_timeline.hpp"
+#include "services/support/cores.hpp"
 #include "services/support/files.hpp"
 #include "services/support/program.hpp"
 
@@ -34,9 +36,11 @@ constexpr std::array<Benchmark, 8> kBenchmarks{{
 }};
 
 constexpr const char* kCheapPhysics = "cheap-physics";
+constexpr const char* kPool = "pool";
 
 int list() {
   fmt::print("{:<20} {}\n", kCheapPhysics, "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers");
+  fmt::print("{:<20} {}\n", kPool, "what each worker did when: busy shares, gaps, a picture");
   for (const Benchmark& benchmark : kBenchmarks) fmt::print("{:<20} {}\n", benchmark.name, benchmark.purpose);
   return kExitOk;
 }
@@ -69,6 +73,18 @@ int compare_levers(const Settings& settings, const std::string& json, const std:
   return ok ? kExitOk : fail(ok.error(), kExitBroken);
 }
 
+int show_pool(const Settings& settings, PoolTimelineOptions options) {
+  if (settings.workers.size() > 1) {
+    return fail({Code::kInvalidArgument, fmt::format("--workers: got {} numbers, wanted one", settings.workers.size())}, kExitUsage);
+  }
+  options.workers = settings.workers.empty() ? usable_cores() : settings.workers.front();
+  if (settings.repeats > 0) options.batches = settings.repeats;
+  options.domain = settings.domain;
+  options.stop = settings.stop;
+  const auto ok = bench_pool(options);
+  return ok ? kExitOk : fail(ok.error(), ok.error().code == Code::kInvalidArgument ? kExitUsage : kExitBroken);
+}
+
 int start(const std::string& name, const Settings& settings, const std::string& json) {
   if (name == "list") return list();
   if (name == "echo") return serve_echo(settings.domain, settings.stop);
@@ -90,9 +106,9 @@ int main(int argc, char** argv) {
   int worlds = CheapPhysicsOptions{}.executed_worlds;
   std::vector<std::string> parts = CheapPhysicsOptions{}.parts;
   // Of its own, so that neither a user's system nor another benchmark is in the way.
-  Settings settings{.workers = {64}, .domain = 100 + static_cast<int>(getpid() % 100)};
+  Settings settings{.domain = 100 + static_cast<int>(getpid() % 100)};
   app.add_option("name", name, "A benchmark, or `list`")->required();
-  app.add_option("--repeats", settings.repeats, "Runs of each side (default: the benchmark's)")
+  app.add_option("--repeats", settings.repeats, "Runs of each side, batches of pool (default: the benchmark's)")
       ->check(CLI::Range(1, 100'000));
   app.add_option("--json", json, "File for all numbers");
   app.add_option("--plot", plot, "Of cheap-physics: PNG of cost against rollouts and against time");
@@ -100,8 +116,15 @@ int main(int argc, char** argv) {
       ->capture_default_str()->delimiter(',')->check(CLI::IsMember(parts));
   app.add_option("--worlds", worlds, "Of cheap-physics: worlds of 15 objects that are planned and executed")
       ->capture_default_str()->check(CLI::Range(1, 1000));
-  app.add_option("--workers", settings.workers, "Of scheduling: worker processes, such as 8,16,64")
-      ->capture_default_str()->delimiter(',')->check(CLI::Range(1, 1024));
+  app.add_option("--workers", settings.workers, "Of scheduling: worker processes, such as 8,16,64 (default: 64);\nof pool: their number (default: one per core this process may use)")
+      ->delimiter(',')->check(CLI::Range(1, 1024));
+  PoolTimelineOptions timeline;
+  bool pin = false;
+  app.add_option("--timeline", timeline.picture, "Of pool: PNG or SVG of what each worker did when");
+  app.add_option("--clients", timeline.clients, "Of pool: clients at once, each with shorter samples than the one before")
+      ->capture_default_str()->check(CLI::Range(1, 8));
+  app.add_flag("--urgent", timeline.urgent, "Of pool: the last client's batches are urgent");
+  app.add_flag("--pin", pin, "Of pool: give each worker a core of its own, in turn");
   app.add_option("--domain", settings.domain, "DDS domain (default: one of 100 to 199, from the process id)")
       ->check(CLI::Range(0, 232));
   app.footer("Exit codes: 0 measured, 1 the two sides computed different things, 2 bad arguments,\n"
@@ -111,6 +134,16 @@ int main(int argc, char** argv) {
   settings.stop = signal.token();
   try {
     if (name == kCheapPhysics) return compare_levers(settings, json, plot, worlds, parts);
+    if (name == kPool) {
+      timeline.json = json;
+      if (pin) timeline.cores = allowed_cores();
+      return show_pool(settings, timeline);
+    }
+    if (app.count("--timeline") + app.count("--clients") + app.count("--urgent") + app.count("--pin") > 0) {
+      fmt::print(stderr, "jostle bench: --timeline, --clients, --urgent, --pin: got '{}', wanted {}\n", name, kPool);
+      return kExitUsage;
+    }
+    if (settings.workers.empty()) settings.workers = {64};
     if (app.count("--plot") + app.count("--worlds") + app.count("--parts") > 0) {
       fmt::print(stderr, "jostle bench: --plot, --worlds, --parts: got '{}', wanted {}\n", name, kCheapPhysics);
       return kExitUsage;

@@ -69,15 +69,18 @@ double Helpers::cpu_seconds() const {
 }
 
 Swarm::Swarm(const dds::Participant& participant, const SwarmOptions& options)
-    : helpers_(options.domain, options.core), participant_(participant), pool_(participant_) {}
+    : helpers_(options.domain, options.core), participant_(participant), pool_(participant_, options.pool) {}
 
 Result<std::unique_ptr<Swarm>> Swarm::start(const SwarmOptions& options) {
   auto participant_result = dds::Participant::open({.name = "jostle_bench", .domain = options.domain});
   if (!participant_result) return participant_result.error();
   std::unique_ptr<Swarm> swarm(new Swarm(*participant_result, options));
   for (int i = 0; i < options.workers; ++i) {
-    auto ok = swarm->helpers_.start("jostle_worker", {"--name", fmt::format("worker-{}", i), "--die-with-parent", std::to_string(getpid())});
-    if (!ok) return ok.error();
+    std::vector<std::string> arguments{"--name", fmt::format("worker-{}", i), "--die-with-parent", std::to_string(getpid())};
+    if (!options.cores.empty()) {
+      arguments.insert(arguments.end(), {"--pin", std::to_string(options.cores[static_cast<std::size_t>(i) % options.cores.size()])});
+    }
+    if (auto ok = swarm->helpers_.start("jostle_worker", arguments); !ok) return ok.error();
   }
   if (auto ok = swarm->gather(options.workers, options.stop); !ok) return ok.error();
   return swarm;

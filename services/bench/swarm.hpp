@@ -61,6 +61,8 @@ struct SwarmOptions {
   int workers = 1;
   int domain = 0;
   std::optional<int> core;  ///< the only one the workers run on, if given
+  std::vector<int> cores;   ///< else: dealt to the workers in turn, each pinned to its own; empty: not pinned
+  RemotePoolOptions pool;
   std::stop_token stop;
 };
 

@@ -3,11 +3,11 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <thread>
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "services/coordinator/coordinator.hpp"
 #include "services/pool_remote/remote_pool.hpp"
+#include "services/support/cores.hpp"
 #include "services/support/program.hpp"
 
 int main(int argc, char** argv) {
@@ -16,12 +16,12 @@ int main(int argc, char** argv) {
   CLI::App app("Accepts a task, plans it with a pool of workers, executes it and reports.",
                "jostle coordinator");
   std::string pool_kind = "dds";
-  int threads = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
+  int threads = usable_cores();
   dds::ParticipantOptions participant_options{.name = "jostle_coordinator"};
   ProcessOptions process;
   app.add_option("--pool", pool_kind, "dds: worker processes; threads: in this process")
       ->capture_default_str()->check(CLI::IsMember({"dds", "threads"}));
-  app.add_option("--threads", threads, "Of the pool of threads")->capture_default_str()->check(CLI::Range(1, 1024));
+  add_count_option(app, "--threads", threads, 1, "Of the pool of threads; auto: one per core this process may use")->default_str("auto");
   add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   die_with_parent(process.parent);

@@ -73,8 +73,9 @@ RemotePool::RemotePool(const dds::Participant& participant, const RemotePoolOpti
       result_reader_(participant, topics::kPoolResult,
                      [this](const msg::TaskResult& result) {
                        if (result.client() != client_) return;
+                       const auto now = std::chrono::steady_clock::now();
                        const std::lock_guard lock(mutex_);
-                       results_.push_back(result);
+                       results_.push_back({result, now});
                        kick();
                      }),
       heartbeat_reader_(participant, topics::kPoolWorker,
@@ -157,7 +158,7 @@ Result<std::unique_ptr<physics_pool::AsyncPool::Ticket>> RemotePool::submit(cons
     active->reply.outcomes[i].sample = batch.first_sample + i;
   }
   active_[active->epoch] = active;
-  scheduler_.start(active->epoch, batch.first_sample, batch.samples);
+  scheduler_.start(active->epoch, batch.first_sample, batch.samples, batch.priority);
   kick();
   return std::unique_ptr<Ticket>(std::make_unique<Underway>(*this, active));
 }
@@ -241,11 +242,14 @@ void RemotePool::absorb_heartbeats(TimePoint now, std::vector<WorkerId>& strange
       return load.client();
     });
     const bool hears_us = us != heartbeat.clients().end();
+    std::uint64_t others = 0;
+    for (const msg::ClientLoad& load : heartbeat.clients()) others += load.client() == client_ ? 0 : load.samples();
     scheduler_.heard({.worker = heartbeat.worker(),
                       .name = heartbeat.name(),
                       .capacity = static_cast<int>(std::min<std::uint32_t>(heartbeat.capacity(), INT32_MAX)),
                       .ready = hears_us && writer != task_writers_.end() && writer->second.matched() > 0,
-                      .samples = hears_us ? us->samples() : 0},
+                      .samples = hears_us ? us->samples() : 0,
+                      .others = others},
                      now);
     ever_heard_ = true;
     changed_.notify_all();
@@ -253,13 +257,34 @@ void RemotePool::absorb_heartbeats(TimePoint now, std::vector<WorkerId>& strange
 }
 
 void RemotePool::absorb_results(TimePoint now) {
-  for (const msg::TaskResult& result : std::exchange(results_, {})) absorb(result, now);
+  for (const Received& received : std::exchange(results_, {})) absorb(received, now);
 }
 
-void RemotePool::absorb(const msg::TaskResult& result, TimePoint now) {
+void RemotePool::trace(const Received& received, bool first) const {
+  if (!options_.on_sample) return;
+  const auto seconds = [](std::int64_t nanoseconds) { return 1e-9 * static_cast<double>(nanoseconds); };
+  const msg::TaskResult& result = received.result;
+  options_.on_sample({.client = client_,
+                      .worker = result.worker(),
+                      .epoch = result.epoch(),
+                      .worker_name = scheduler_.name_of(result.worker()),
+                      .thread = result.thread(),
+                      .sample = result.sample(),
+                      .attempt = result.attempt(),
+                      .first = first,
+                      .sent = seconds(result.sent()),
+                      .received = std::chrono::duration<double>(received.at.time_since_epoch()).count(),
+                      .arrived = seconds(result.arrived()),
+                      .started = seconds(result.started()),
+                      .finished = seconds(result.finished())});
+}
+
+void RemotePool::absorb(const Received& received, TimePoint now) {
+  const msg::TaskResult& result = received.result;
   const auto found = active_.find(result.epoch());
   if (found == active_.end()) {
     scheduler_.accept(result.worker(), result.epoch(), result.sample(), 0, now);  // late: counted
+    if (result.error().empty()) trace(received, false);
     return;
   }
   const std::shared_ptr<Active> active = found->second;
@@ -278,7 +303,11 @@ void RemotePool::absorb(const msg::TaskResult& result, TimePoint now) {
     scheduler_.bench(result.worker(), now);
     return;
   }
-  if (!scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps(), now)) return;
+  const bool first = scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps(), now,
+                                       std::chrono::duration<double>(1e-9 * (static_cast<double>(result.finished()) -
+                                                                             static_cast<double>(result.started()))));
+  trace(received, first);
+  if (!first) return;
   adopt(*active, std::move(outcome_result).value());
   if (scheduler_.missing(active->epoch) > 0) return;
   active->reply.winner = physics_pool::select_winner(active->reply.outcomes, active->batch.incumbent);
@@ -315,6 +344,7 @@ void RemotePool::prepare_tasks(TimePoint now) {
     task.best_cost(active.best_cost);
     task.first_success(active.first_success);
     task.samples(assignment.samples);
+    task.sent(std::chrono::nanoseconds(now.time_since_epoch()).count());
     outgoing_.tasks.emplace_back(assignment.worker, std::move(task));
   }
 }

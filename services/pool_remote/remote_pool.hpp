@@ -4,6 +4,7 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -15,6 +16,7 @@
 #include "services/dds/reader.hpp"
 #include "services/dds/topics.hpp"
 #include "services/pool_remote/scheduler.hpp"
+#include "services/pool_remote/timeline.hpp"
 
 namespace jostle::services {
 
@@ -22,6 +24,9 @@ struct RemotePoolOptions {
   /// How long a batch tolerates that no worker can be used.
   std::chrono::milliseconds no_worker_timeout{10'000};
   SchedulerOptions scheduler;
+  /// Hears of every sample that comes back, from the pool's own thread; must be quick
+  /// and use nothing of the pool's. Samples that are cancelled do not come back.
+  std::function<void(const SampleTrace&)> on_sample;
 };
 
 /// Pool of worker processes in one DDS domain. Simulates nothing itself; the
@@ -51,6 +56,10 @@ class RemotePool final : public physics_pool::AsyncPool {
   class Underway;
   using Control = jostle_msgs::msg::BatchControl;
   using Task = jostle_msgs::msg::Task;
+  struct Received {
+    jostle_msgs::msg::TaskResult result;
+    physics_pool::TimePoint at;
+  };
   /// What leaves in one turn of the dispatcher.
   struct Outgoing {
     std::vector<Control> controls;
@@ -65,7 +74,8 @@ class RemotePool final : public physics_pool::AsyncPool {
   void send(const Outgoing& outgoing);
   void absorb_results(physics_pool::TimePoint now);
   void absorb_heartbeats(physics_pool::TimePoint now, std::vector<WorkerId>& strangers);
-  void absorb(const jostle_msgs::msg::TaskResult& result, physics_pool::TimePoint now);
+  void absorb(const Received& received, physics_pool::TimePoint now);
+  void trace(const Received& received, bool first) const;
   void adopt(Active& active, physics_pool::RolloutOutcome outcome);
   void prepare_tasks(physics_pool::TimePoint now);
   void finish(Active& active, Result<physics_pool::BatchReply> reply);
@@ -83,7 +93,7 @@ class RemotePool final : public physics_pool::AsyncPool {
   Epoch last_epoch_;
   std::unordered_map<Hash, std::pair<StateLayout, double>> worlds_;  // and their time steps, s
   std::map<Epoch, std::shared_ptr<Active>> active_;  // shared with its ticket
-  std::vector<jostle_msgs::msg::TaskResult> results_;
+  std::vector<Received> results_;
   std::vector<jostle_msgs::msg::WorkerHeartbeat> heartbeats_;
   Outgoing outgoing_;
   physics_pool::TimePoint last_usable_;

@@ -1,12 +1,20 @@
 #include "services/pool_remote/scheduler.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace jostle::services {
+
+using physics_pool::Priority;
+
 namespace {
 
 constexpr int kLargestCapacity = 1024;  // threads of one process; more is a broken heartbeat
 constexpr int kSpare = 1;               // samples a worker holds beyond what it can run
+constexpr double kNews = 0.1;           // weight of one more in what is typical
+constexpr std::chrono::duration<double> kCover{0.004};  // an exchange with a worker on a busy machine
+constexpr double kMostCover = 16.0;     // samples per thread, however short
+constexpr std::uint64_t kUrgentInARow = 7;  // samples, while a normal batch has some to hand out
 constexpr std::uint8_t kCopies = 2;     // of one sample at a time
 constexpr double kSlow = 2.0;           // times the typical time: worth a copy
 constexpr int kEmptyHeartbeats = 2;     // the first may have crossed a task on its way
@@ -18,6 +26,7 @@ void Scheduler::heard(const WorkerNews& news, TimePoint now) {
   worker.status.name = news.name;
   worker.status.alive = news.capacity > 0;
   worker.ready = news.ready;
+  worker.others = news.others;
   worker.last_heard = now;
   if (!worker.status.alive) return take_back(worker, now);
   worker.status.capacity = std::clamp(news.capacity, 1, kLargestCapacity);
@@ -57,8 +66,9 @@ int Scheduler::usable_workers(TimePoint now) const {
       std::ranges::count_if(workers_, [&](const auto& entry) { return usable(entry.second, now); }));
 }
 
-void Scheduler::start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples) {
-  batches_[epoch] = {.first_sample = first_sample,
+void Scheduler::start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples, Priority priority) {
+  batches_[epoch] = {.priority = priority,
+                     .first_sample = first_sample,
                      .samples = std::vector<Sample>(samples),
                      .missing = samples};
 }
@@ -77,7 +87,9 @@ std::uint32_t Scheduler::missing(Epoch epoch) const {
   return found == batches_.end() ? 0 : found->second.missing;
 }
 
-bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now) {
+bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now,
+                       std::chrono::duration<double> ran) {
+  if (ran.count() > 0) typical_run_ += (typical_run_.count() > 0 ? kNews : 1.0) * (ran - typical_run_);
   const auto worker = workers_.find(id);
   if (worker != workers_.end()) {
     auto& outstanding = worker->second.outstanding;
@@ -85,7 +97,6 @@ bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint
       return candidate.epoch == epoch && candidate.sample == sample;
     });
     if (entry != outstanding.end()) {
-      constexpr double kNews = 0.1;  // weight of one more
       typical_ += kNews * (now - entry->since - typical_);
       release(*entry);
       outstanding.erase(entry);
@@ -147,6 +158,13 @@ void Scheduler::take_back(Worker& worker, TimePoint sent_before) {
   });
 }
 
+// Samples that a worker may hold.
+int Scheduler::room(const Worker& worker) const {
+  if (worker.others == 0 || typical_run_.count() <= 0) return worker.status.capacity + kSpare;
+  const double cover = std::clamp(std::ceil(kCover / typical_run_), 1.0, kMostCover);
+  return worker.status.capacity * static_cast<int>(cover) + kSpare;
+}
+
 // The usable worker with the emptiest hands, relative to its size.
 std::pair<const WorkerId, Scheduler::Worker>* Scheduler::least_loaded(TimePoint now) {
   std::pair<const WorkerId, Worker>* best = nullptr;
@@ -154,7 +172,7 @@ std::pair<const WorkerId, Scheduler::Worker>* Scheduler::least_loaded(TimePoint 
   for (auto& entry : workers_) {
     const Worker& worker = entry.second;
     const auto held = static_cast<int>(worker.outstanding.size());
-    if (!usable(worker, now) || held >= worker.status.capacity + kSpare) continue;
+    if (!usable(worker, now) || held >= room(worker)) continue;
     const double load = static_cast<double>(held) / worker.status.capacity;
     if (best && load >= least) continue;
     best = &entry;
@@ -164,10 +182,25 @@ std::pair<const WorkerId, Scheduler::Worker>* Scheduler::least_loaded(TimePoint 
 }
 
 bool Scheduler::next_sample(Choice& choice) {
+  const bool normal_first = urgent_in_a_row_ >= kUrgentInARow;
+  if (normal_first && next_sample_of(Priority::kNormal, choice)) {
+    urgent_in_a_row_ = 0;
+    return true;
+  }
+  if (next_sample_of(Priority::kUrgent, choice)) {
+    ++urgent_in_a_row_;
+    return true;
+  }
+  urgent_in_a_row_ = 0;
+  return !normal_first && next_sample_of(Priority::kNormal, choice);
+}
+
+bool Scheduler::next_sample_of(Priority priority, Choice& choice) {
   auto batch = batches_.upper_bound(last_served_);
   for (std::size_t i = 0; i < batches_.size(); ++i, ++batch) {
     if (batch == batches_.end()) batch = batches_.begin();
     auto& [epoch, content] = *batch;
+    if (content.priority != priority) continue;
     while (content.next < content.samples.size() && content.samples[content.next].done) ++content.next;
     std::uint32_t index = content.next;
     if (!content.returned.empty() && *content.returned.begin() < index) {
@@ -234,12 +267,17 @@ std::vector<Assignment> Scheduler::assign(TimePoint now) {
   }
   for (auto& [id, worker] : workers_) {
     while (usable(worker, now) &&
-           static_cast<int>(worker.outstanding.size()) < worker.status.capacity &&
+           worker.outstanding.size() + worker.others < static_cast<std::size_t>(worker.status.capacity) &&
            next_copy(worker, now, choice)) {
       give(id, worker, choice, now, assignments);
     }
   }
   return assignments;
+}
+
+std::string Scheduler::name_of(WorkerId worker) const {
+  const auto found = workers_.find(worker);
+  return found == workers_.end() ? "" : found->second.status.name;
 }
 
 physics_pool::PoolStatus Scheduler::status() const {

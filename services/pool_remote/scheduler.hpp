@@ -33,6 +33,7 @@ struct WorkerNews {
   int capacity = 1;           ///< rollouts at a time; 0: it takes its leave
   bool ready = false;         ///< it hears us, and we hear it
   std::uint32_t samples = 0;  ///< of ours, queued or running there
+  std::uint64_t others = 0;   ///< of other clients' there
 };
 
 struct SchedulerOptions {
@@ -52,12 +53,17 @@ struct SchedulerOptions {
 };
 
 /// Rules
-///   lowest sample first; batches take turns
+///   lowest sample first; batches of equal priority take turns, urgent ones go
+///   first, and every eighth sample is a normal one's while there are both
 ///   a worker holds at most capacity + 1 samples: one more than it can run, so
 ///   that no thread waits for the network between two of them
+///   where others use the worker too, and samples are shorter than messages may
+///   take, it holds as many as last that long: who has nothing there when a thread
+///   is free loses the turn
 ///   samples of the dead go back to the queue
 ///   when the queue is empty, idle workers get a second copy of samples that
-///   wait behind others first, then of those outstanding longest
+///   wait behind others first, then of those outstanding longest; a worker that
+///   has enough to do for other clients is not idle
 ///
 /// Threads  one at a time.
 class Scheduler {
@@ -72,14 +78,16 @@ class Scheduler {
   int usable_workers(TimePoint now) const;
 
   /// Batches.
-  void start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples);
+  void start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples,
+             physics_pool::Priority priority = physics_pool::Priority::kNormal);
   /// Forgets a batch; true when workers still hold samples of it.
   bool finish(Epoch epoch);
   std::uint32_t missing(Epoch epoch) const;
 
   /// A sample came back. True when it is the first result of that sample;
-  /// otherwise it is late or a duplicate, and counted.
-  bool accept(WorkerId worker, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now);
+  /// otherwise it is late or a duplicate, and counted. `ran`: for how long, if known.
+  bool accept(WorkerId worker, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now,
+              std::chrono::duration<double> ran = {});
   /// Samples above this one are no longer wanted.
   void drop_above(Epoch epoch, std::uint32_t sample);
 
@@ -87,6 +95,7 @@ class Scheduler {
   std::vector<Assignment> assign(TimePoint now);
 
   physics_pool::PoolStatus status() const;
+  std::string name_of(WorkerId worker) const;  ///< empty if it is not known
 
  private:
   struct Outstanding {
@@ -97,6 +106,7 @@ class Scheduler {
   struct Worker {
     physics_pool::WorkerStatus status;
     bool ready = false;
+    std::uint64_t others = 0;              // other clients' samples, at the last heartbeat
     TimePoint last_heard;
     TimePoint benched_until;
     int empty_heartbeats = 0;             // in a row, though samples are outstanding
@@ -108,6 +118,7 @@ class Scheduler {
     std::uint32_t attempts = 0;  // handed out ever
   };
   struct Batch {
+    physics_pool::Priority priority = physics_pool::Priority::kNormal;
     std::uint32_t first_sample = 0;
     std::vector<Sample> samples;
     std::uint32_t next = 0;               // index of the lowest never handed out
@@ -121,10 +132,12 @@ class Scheduler {
   };
 
   bool usable(const Worker& worker, TimePoint now) const;
+  int room(const Worker& worker) const;
   void take_back(Worker& worker, TimePoint sent_before);
   void release(const Outstanding& outstanding);
   std::pair<const WorkerId, Worker>* least_loaded(TimePoint now);
   bool next_sample(Choice& choice);
+  bool next_sample_of(physics_pool::Priority priority, Choice& choice);
   bool next_copy(const Worker& worker, TimePoint now, Choice& choice) const;
   void give(WorkerId id, Worker& worker, const Choice& choice, TimePoint now,
             std::vector<Assignment>& assignments);
@@ -133,7 +146,9 @@ class Scheduler {
   std::map<WorkerId, Worker> workers_;
   std::map<Epoch, Batch> batches_;
   Epoch last_served_ = 0;
+  std::uint64_t urgent_in_a_row_ = 0;  // samples handed out
   std::chrono::duration<double> typical_{0.0};  // from handing out to coming back, lately
+  std::chrono::duration<double> typical_run_{0.0};  // of a sample, lately; 0: not known
   std::uint64_t reissued_ = 0;
   std::uint64_t duplicates_ = 0;
 };

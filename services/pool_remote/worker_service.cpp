@@ -24,6 +24,10 @@ constexpr std::chrono::milliseconds kRetry{20};    // while a world is waited fo
 constexpr std::size_t kArrivals = 1024;            // unread tasks; credit keeps honest clients far below
 constexpr std::size_t kCancelled = 64;             // cancelled batches remembered
 
+std::int64_t nanoseconds(std::chrono::steady_clock::time_point time) {
+  return std::chrono::nanoseconds(time.time_since_epoch()).count();
+}
+
 std::string host_name() {
   char name[256] = "";
   gethostname(name, sizeof name - 1);
@@ -56,7 +60,7 @@ WorkerService::WorkerService(const dds::Participant& participant, const WorkerOp
       threads_(std::max(options.threads, 1)),
       result_writer_(participant, topics::kPoolResult),
       heartbeat_writer_(participant, topics::kPoolWorker),
-      executor_(threads_),
+      executor_(threads_, options.cores),
       world_reader_(participant, topics::kPoolWorld,
                     [this](const msg::WorldDescription& world) {
                       worlds_.announce({.high = world.high(), .low = world.low()}, world.scene());
@@ -118,11 +122,12 @@ void WorkerService::examine(const Arrival& arrival) {
   if (auto ok = physics_pool::validate(batch, world->geometry().layout, world->time_step()); !ok) {
     return refuse(task, ok.error());
   }
-  accept(task, std::move(batch), world);
+  accept(arrival, std::move(batch), world);
 }
 
-void WorkerService::accept(const Task& task, RolloutBatch batch, WorldPtr world) {
+void WorkerService::accept(const Arrival& arrival, RolloutBatch batch, WorldPtr world) {
   const std::lock_guard lock(mutex_);
+  const Task& task = arrival.task;
   const BatchId id{task.client(), task.epoch()};
   if (std::ranges::find(cancelled_, id) != cancelled_.end()) {
     loads_[task.client()] -= static_cast<std::uint32_t>(task.samples().size());
@@ -133,13 +138,18 @@ void WorkerService::accept(const Task& task, RolloutBatch batch, WorldPtr world)
     running.run = std::make_shared<physics_pool::BatchRun>();
     running.run->batch = std::move(batch);
     running.run->world = std::move(world);
-    running.run->on_outcome = [this, id](RolloutOutcome outcome, int) { finish(id, std::move(outcome)); };
+    running.run->on_outcome = [this, id](const RolloutOutcome& outcome, const physics_pool::Shift& shift) {
+      finish(id, outcome, shift);
+    };
   }
   running.run->signals.offer_cost(task.best_cost());
   running.run->signals.offer_success(task.first_success());
   for (const std::uint32_t sample : task.samples()) {
-    if (running.attempts.try_emplace(sample, task.attempt()).second) {
-      jobs_[task.client()].push_back({.batch = id, .attempt = task.attempt(), .sample = sample});
+    const Job job{.client = task.client(), .epoch = task.epoch(), .sample = sample,
+                  .priority = running.run->batch.priority};
+    const Held held{.job = job, .attempt = task.attempt(), .sent = task.sent(), .arrived = arrival.arrived};
+    if (running.samples.try_emplace(sample, held).second) {
+      turns_.wait(job);
     } else {
       --loads_[task.client()];  // already here
     }
@@ -160,45 +170,56 @@ void WorkerService::refuse(const Task& task, const Error& error) {
   loads_[task.client()] -= static_cast<std::uint32_t>(task.samples().size());
 }
 
-// Deals waiting samples to the executor, one client after the other. One more
-// than there are threads, so that none waits for this thread between two.
+// Gives every free thread a sample. No earlier: a sample that comes while the
+// threads are busy may have the better claim to the next free one.
 void WorkerService::feed() {
-  while (dealt_ < threads_ + 1) {
-    auto client = jobs_.upper_bound(last_client_);
-    if (client == jobs_.end()) client = jobs_.begin();
-    if (client == jobs_.end()) return;
-    last_client_ = client->first;
-    const Job job = client->second.front();
-    client->second.pop_front();
-    if (client->second.empty()) jobs_.erase(client);
+  while (dealt_ < threads_) {
+    const auto job = turns_.next();
+    if (!job) return;
+    Running& running = running_.at({job->client, job->epoch});
+    running.samples.at(job->sample).job = *job;
     ++dealt_;
-    executor_.submit(running_.at(job.batch).run, job.sample);
+    executor_.submit(running.run, job->sample);
   }
 }
 
-// On the thread that simulated.
-void WorkerService::finish(const BatchId& batch, RolloutOutcome outcome) {
-  msg::TaskResult result = convert::to_wire(outcome);
-  result.client(batch.first);
-  result.worker(id_);
-  result.epoch(batch.second);
-  {
-    const std::lock_guard lock(mutex_);
-    Running& running = running_.at(batch);
-    const auto attempt = running.attempts.find(outcome.sample);
-    result.attempt(attempt->second);
-    running.attempts.erase(attempt);
-    if (running.attempts.empty()) running_.erase(batch);
-    --dealt_;
-    ++rollouts_;
-    engine_steps_ += outcome.engine_steps;
-    kicked_ = true;
-    wake_.notify_one();
+// On the thread that simulated, which takes its next sample from here: no other
+// thread has to wake up in between.
+void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, const physics_pool::Shift& shift) {
+  const bool skipped = outcome.end == physics_pool::End::kSkipped;  // cancelled, or the client knows of the success that did it
+  std::unique_lock lock(mutex_);
+  const Held held = release(batch, outcome.sample);
+  lock.unlock();
+  if (!skipped) {
+    msg::TaskResult result = convert::to_wire(outcome);
+    result.client(batch.first);
+    result.worker(id_);
+    result.epoch(batch.second);
+    result.attempt(held.attempt);
+    result.sent(held.sent);
+    result.arrived(nanoseconds(held.arrived));
+    result.started(nanoseconds(shift.started));
+    result.finished(nanoseconds(shift.finished));
+    result.thread(static_cast<std::uint32_t>(shift.thread));
+    result_writer_.write(result);
   }
-  // Skipped: the client cancelled it, or knows of the success that did.
-  if (outcome.end != physics_pool::End::kSkipped) result_writer_.write(result);
-  const std::lock_guard lock(mutex_);
+  lock.lock();
   --loads_[batch.first];  // after the answer: a client may trust "nothing of yours is here"
+  ++rollouts_;
+  engine_steps_ += outcome.engine_steps;
+  turns_.done(held.job, shift.finished - shift.started, skipped);
+  --dealt_;
+  feed();
+}
+
+// Of a sample that waits or runs no more.
+WorkerService::Held WorkerService::release(const BatchId& batch, std::uint32_t sample) {
+  const auto running = running_.find(batch);
+  const auto found = running->second.samples.find(sample);
+  const Held held = found->second;
+  running->second.samples.erase(found);
+  if (running->second.samples.empty()) running_.erase(running);
+  return held;
 }
 
 void WorkerService::obey(const msg::BatchControl& control) {
@@ -212,13 +233,17 @@ void WorkerService::obey(const msg::BatchControl& control) {
   if (control.kind() == static_cast<std::uint8_t>(ControlKind::kSuccess)) signals.offer_success(control.sample());
 }
 
-// Running samples notice within an engine step; waiting ones pass the executor
-// unrun, which keeps one way of counting them.
+// Running samples notice within an engine step; waiting ones are gone at once.
 void WorkerService::cancel(const BatchId& batch) {
   cancelled_.push_back(batch);
   if (cancelled_.size() > kCancelled) cancelled_.pop_front();
   const auto running = running_.find(batch);
-  if (running != running_.end()) running->second.run->signals.cancel();
+  if (running == running_.end()) return;
+  running->second.run->signals.cancel();
+  for (const Job& job : turns_.withdraw(batch.first, batch.second)) {
+    release(batch, job.sample);
+    --loads_[batch.first];
+  }
 }
 
 void WorkerService::beat(std::stop_token stop) {

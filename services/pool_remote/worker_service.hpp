@@ -15,6 +15,7 @@
 #include "physics_pool/local/executor.hpp"
 #include "services/dds/reader.hpp"
 #include "services/dds/topics.hpp"
+#include "services/pool_remote/turns.hpp"
 #include "services/pool_remote/world_store.hpp"
 
 namespace jostle::services {
@@ -22,9 +23,11 @@ namespace jostle::services {
 struct WorkerOptions {
   std::string name;  ///< as clients report it; empty: host and process id
   int threads = 1;   ///< rollouts at a time; one per core is enough
+  std::vector<int> cores;  ///< of each simulating thread; empty: wherever the system likes
 };
 
-/// Takes tasks, runs their samples, answers each. Clients take turns.
+/// Takes tasks, runs their samples, answers each. Clients and priorities share the
+/// threads by turns.hpp; whose sample runs is decided when a thread is free, not before.
 ///
 /// Threads  `threads` that simulate; one that checks tasks, compiles worlds and
 ///          deals samples out; one for heartbeats, so that a worker deep in
@@ -52,24 +55,26 @@ class WorkerService {
     Task task;
     TimePoint arrived;
   };
-  /// A checked sample that waits for a thread.
-  struct Job {
-    BatchId batch;
+  /// A sample that waits or runs, and what its answer repeats of its task.
+  struct Held {
+    Job job;
     std::uint32_t attempt = 0;
-    std::uint32_t sample = 0;
+    std::int64_t sent = 0;  // ns, the client's clock
+    TimePoint arrived;
   };
   /// A batch of which samples wait or run here.
   struct Running {
     physics_pool::BatchRunPtr run;
-    std::map<std::uint32_t, std::uint32_t> attempts;  // by sample, waiting or running
+    std::map<std::uint32_t, Held> samples;  // by index
   };
 
   void serve(std::stop_token stop);
   void examine(const Arrival& arrival);
-  void accept(const Task& task, physics_pool::RolloutBatch batch, physics_pool::WorldPtr world);
+  void accept(const Arrival& arrival, physics_pool::RolloutBatch batch, physics_pool::WorldPtr world);
   void refuse(const Task& task, const Error& error);
   void feed();
-  void finish(const BatchId& batch, physics_pool::RolloutOutcome outcome);
+  void finish(const BatchId& batch, const physics_pool::RolloutOutcome& outcome, const physics_pool::Shift& shift);
+  Held release(const BatchId& batch, std::uint32_t sample);
   void obey(const jostle_msgs::msg::BatchControl& control);
   void cancel(const BatchId& batch);
   void beat(std::stop_token stop);
@@ -85,12 +90,11 @@ class WorkerService {
   mutable std::mutex mutex_;  // guards everything down to kicked_
   std::condition_variable_any wake_;  // of the serving thread
   std::deque<Arrival> arrivals_;
-  std::map<std::uint64_t, std::deque<Job>> jobs_;  // by client
+  Turns turns_;
   std::map<BatchId, Running> running_;
   std::map<std::uint64_t, std::uint32_t> loads_;  // samples per client: arrived, waiting, running
   std::deque<BatchId> cancelled_;                 // lately; a task may come after its cancellation
-  std::uint64_t last_client_ = 0;                 // that was dealt a thread
-  int dealt_ = 0;                                 // samples with the executor
+  int dealt_ = 0;                                 // samples with the executor: one per busy thread
   std::uint64_t rollouts_ = 0;
   std::uint64_t engine_steps_ = 0;
   bool kicked_ = false;

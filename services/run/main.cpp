@@ -4,13 +4,13 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <thread>
 
 #include "services/config/parameters.hpp"
 #include "services/config/predictor.hpp"
 #include "services/run/display.hpp"
 #include "services/run/report.hpp"
 #include "services/run/session.hpp"
+#include "services/support/cores.hpp"
 #include "services/support/files.hpp"
 #include "services/support/program.hpp"
 
@@ -80,10 +80,12 @@ int main(int argc, char** argv) {
                "jostle run");
   Arguments arguments;
   RunOptions options;
-  options.workers = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
+  options.workers = usable_cores();
+  bool pin = false;
   app.add_option("scene", arguments.scene, "Scene file; `jostle scene generate` makes one")->required();
-  app.add_option("--workers", options.workers, "Worker processes, or threads (default: one per core)")
-      ->check(CLI::Range(0, 1024));
+  add_count_option(app, "--workers", options.workers, 0, "Worker processes, or threads; auto: one per core this process may use")
+      ->default_str("auto");
+  app.add_flag("--pin", pin, "Give each worker process a core of its own, in turn");
   app.add_option("--controller", options.controller, "To grasp, or: online re-planning (default), nr: naive "
                                                         "re-planning; to push, mpc: model-predictive control (default)")
       ->check(CLI::IsMember({"or", "nr", "mpc"}));
@@ -108,6 +110,10 @@ int main(int argc, char** argv) {
   if (options.pool == "threads" && options.workers == 0) {
     return fail({Code::kInvalidArgument, "--workers: got 0, wanted at least 1 thread"}, kExitUsage);
   }
+  if (pin && options.pool == "threads") {
+    return fail({Code::kInvalidArgument, "--pin: got --pool threads, wanted dds: only worker processes are pinned"}, kExitUsage);
+  }
+  if (pin) options.cores = allowed_cores();
   const StopSignal signal;
   if (auto ok = complete(arguments, options); !ok) return fail(ok.error(), kExitUsage);
   try {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "physics_pool/scene/generate.hpp"
 #include "physics_pool/scene/scene.hpp"
@@ -21,6 +22,7 @@ struct RunOptions {
   std::string predictor = "fine";  ///< see services/config/predictor.hpp
   std::string pool = "dds";
   int workers = 2;
+  std::vector<int> cores;  ///< dealt to the workers in turn; empty: not pinned
   std::uint64_t seed = 1;
   double rate = 0.0;     ///< of the simulated world; 0: as fast as possible
   bool plan_only = false;

@@ -87,7 +87,7 @@ Result<void> Session::start_processes() {
   coordinator_process_ = std::move(coordinator_result).value();
 
   for (int i = 0; options_.pool == "dds" && i < options_.workers; ++i) {
-    auto worker_result = start_worker();
+    auto worker_result = start_worker(static_cast<std::size_t>(i));
     if (!worker_result) return worker_result.error();
     workers_.push_back(std::move(worker_result).value());
   }
@@ -95,12 +95,13 @@ Result<void> Session::start_processes() {
   return {};
 }
 
-Result<ChildProcess> Session::start_worker() {
+Result<ChildProcess> Session::start_worker(std::size_t place) {
   const std::string name = fmt::format("worker-{}", workers_started_++);
-  return ChildProcess::start(
-      program("worker"),
-      {"--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())},
-      folder_ / (name + ".log"));
+  std::vector<std::string> arguments{"--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())};
+  if (const auto& cores = options_.cores; !cores.empty()) {
+    arguments.insert(arguments.end(), {"--pin", std::to_string(cores[place % cores.size()])});
+  }
+  return ChildProcess::start(program("worker"), arguments, folder_ / (name + ".log"));
 }
 
 Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
@@ -188,7 +189,7 @@ Result<void> Session::look_after() {
                    fmt::format("workers keep ending: {} within {} s, the last one: {}\n{}", restarts_.size(),
                                kRestartWindow.count(), *ended, worker.last_words())};
     }
-    auto worker_result = start_worker();
+    auto worker_result = start_worker(static_cast<std::size_t>(&worker - workers_.data()));
     if (!worker_result) return worker_result.error();
     if (watcher_.on_notice) {
       watcher_.on_notice(fmt::format("worker {} ended ({}); started another", worker.pid(), *ended));

@@ -53,7 +53,7 @@ class Session {
           std::filesystem::path folder);
 
   Result<void> start_processes();
-  Result<ChildProcess> start_worker();
+  Result<ChildProcess> start_worker(std::size_t place);  // among the workers
   Result<void> look_after();
   Result<void> check_alive(const std::string& name, ChildProcess& child) const;
   Result<void> check_heard(const std::string& name, Clock::time_point heard) const;

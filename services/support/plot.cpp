@@ -1,24 +1,16 @@
 #include "services/support/plot.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdlib>
-#include <sstream>
 
-#include "services/support/child_process.hpp"
-#include "services/support/files.hpp"
+#include "services/support/gnuplot.hpp"
 
 namespace jostle::services {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::array kColours{"#000000", "#E69F00", "#56B4E9", "#009E73",
-                              "#D55E00", "#CC79A7", "#0072B2", "#999933"};
 
 // Pixels: a panel with its axis, and beside the last one the legend.
 constexpr int kPanelWidth = 700, kLegendWidth = 300, kHeight = 600, kFont = 14;
@@ -40,23 +32,6 @@ Result<void> check(const std::vector<Panel>& panels) {
     }
   }
   return {};
-}
-
-Result<fs::path> find_gnuplot() {
-  const char* path = std::getenv("PATH");
-  std::istringstream folders(path ? path : "");
-  for (std::string folder; std::getline(folders, folder, ':');) {
-    const fs::path program = fs::path(folder) / "gnuplot";
-    if (access(program.c_str(), X_OK) == 0) return program;
-  }
-  return Error{Code::kNotFound, "gnuplot: not found on PATH; install the package gnuplot-nox"};
-}
-
-// A gnuplot string in which nothing but the quote has a meaning.
-std::string quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? std::string("''") : std::string(1, c == '\n' ? ' ' : c);
-  return result + "'";
 }
 
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.9g}", value) : "NaN"; }
@@ -143,28 +118,11 @@ std::string script_of(const fs::path& png, const std::string& title, const std::
   return text + "unset multiplot\nunset output\n";
 }
 
-Result<void> run_gnuplot(const fs::path& gnuplot, const fs::path& folder, const std::string& script) {
-  if (auto ok = write_text(folder / "plot.gp", script); !ok) return ok;
-  auto child_result = ChildProcess::start(gnuplot, {(folder / "plot.gp").string()}, folder / "log");
-  if (!child_result) return child_result.error();
-  const std::string end = child_result->wait();
-  if (end == "exit code 0") return {};
-  return Error{Code::kIo, fmt::format("gnuplot: {}\n{}", end, child_result->last_words())};
-}
-
 }  // namespace
 
 Result<void> plot(const fs::path& png, const std::string& title, const std::vector<Panel>& panels) {
   if (auto ok = check(panels); !ok) return ok;
-  auto gnuplot_result = find_gnuplot();
-  if (!gnuplot_result) return gnuplot_result.error();
-  auto folder_result = make_temporary_folder("plot");
-  if (!folder_result) return folder_result.error();
-  std::error_code ignored;
-  if (png.has_parent_path()) fs::create_directories(png.parent_path(), ignored);
-  auto drawn = run_gnuplot(*gnuplot_result, *folder_result, script_of(png, title, panels));
-  fs::remove_all(*folder_result, ignored);
-  return drawn;
+  return run_gnuplot(png, script_of(png, title, panels));
 }
 
 }  // namespace jostle::services

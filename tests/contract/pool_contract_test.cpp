@@ -151,6 +151,15 @@ TEST_P(PoolContract, EqualRequestsGiveBitEqualReplies) {
   EXPECT_EQ(fingerprints(first), fingerprints(reference(batch)));
 }
 
+TEST_P(PoolContract, PriorityChangesNothingInTheReply) {
+  RolloutBatch batch = push_batch(scene, 6);
+  batch.stop_losers = false;
+  const BatchReply normal = run(batch);
+  batch.priority = Priority::kUrgent;
+
+  EXPECT_EQ(fingerprints(run(batch)), fingerprints(normal));
+}
+
 TEST_P(PoolContract, WinnerIsTheSameWithAndWithoutStopping) {
   RolloutBatch stopping = push_batch(scene, 8), thorough = stopping;
   thorough.stop_losers = false;
@@ -279,6 +288,7 @@ TEST_P(PoolContract, BadFieldIsNamed) {
       {"step_duration", [](RolloutBatch& b) { b.step_duration = 0.0301; }},
       {"incumbent", [&](RolloutBatch& b) { b.incumbent = kNaN; }},
       {"objective.edge", [](RolloutBatch& b) { b.objective.edge = -1; }},
+      {"priority", [](RolloutBatch& b) { b.priority = static_cast<Priority>(7); }},
       {"wait", [](RolloutBatch& b) { b.wait = 1h; }},
   };
   for (const auto& [field, spoil] : cases) {

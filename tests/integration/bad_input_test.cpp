@@ -71,9 +71,25 @@ TEST_F(BadInput, ArgumentsAreRefusedWithGotAndWanted) {
   expect_refused({easy, "--pool", "swimming"}, {"pool", "swimming", "dds", "threads"});
   expect_refused({easy, "--workers", "-1"}, {"workers", "-1"});
   expect_refused({easy, "--workers", "0", "--pool", "threads"}, {"--workers", "got 0", "wanted"});
+  expect_refused({easy, "--workers", "many"}, {"--workers", "many"});
+  expect_refused({easy, "--pin", "--pool", "threads"}, {"--pin", "got --pool threads", "wanted dds"});
   expect_refused({easy, "--rate", "-1"}, {"rate", "-1"});
   expect_refused({easy, "--parameters", plain, "--domain", "999"}, {"999", "wanted"});
   expect_refused({}, {"scene"});
+}
+
+TEST_F(BadInput, WorkerRefusesCoresThatItMayNotUse) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"--pin", "1023"}, "got 1023, wanted some of"},
+      {{"--pin", "0-"}, "got '0-', wanted a list such as 2,3,6-8"},
+      {{"--pin", "--threads", "1024"}, "for 1024 threads, wanted one for each"},
+  };
+  for (const auto& [arguments, words] : cases) {
+    const auto worker = program("jostle_worker", arguments);
+    EXPECT_EQ(worker->wait(kPatience), 2);
+    EXPECT_THAT(worker->err(), HasSubstr("--pin: cores: "));
+    EXPECT_THAT(worker->err(), HasSubstr(words));
+  }
 }
 
 TEST_F(BadInput, ParametersAreRefusedWithFileFieldGotAndWanted) {

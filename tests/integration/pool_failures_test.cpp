@@ -1,4 +1,4 @@
-// Workers that die, stall, come late or are shared.
+// Workers that die, stall or come late.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -151,23 +151,6 @@ TEST_F(PoolFailures, WorkerEndsCleanlyInTheMiddleOfItsWork) {
 
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
   EXPECT_LT(took, 200ms);
-  EXPECT_TRUE(reply.get());
-}
-
-TEST_F(PoolFailures, TwoClientsShareAWorkerFairly) {
-  start_workers(1);
-  const auto other_participant = dds::Participant::open({.domain = domain}).value();
-  RemotePool other(other_participant);
-  ASSERT_TRUE(other.load(scene));
-  ASSERT_TRUE(other.wait_for_workers(1, in(kPatience)));
-  const RolloutBatch batch = wait_batch(scene, 40, 10ms);
-
-  auto reply = run_aside(batch);
-  const auto other_result = other.run(batch, in(kPatience));
-  const std::uint64_t done = status_of(sut, workers[0].pid())->rollouts;
-
-  ASSERT_TRUE(other_result);
-  EXPECT_GE(done, 30u) << "one client was served before the other";
   EXPECT_TRUE(reply.get());
 }
 

@@ -108,6 +108,7 @@ TEST_F(PoolWire, MalformedTaskIsAnsweredWithTheFieldsName) {
       {"objective.goal", [](Task& t) { t.batch().objective().goal(kNaN); }},
       {"wait", [](Task& t) { t.batch().wait(INT64_MAX); }},
       {"wait", [](Task& t) { t.batch().wait(-2); }},
+      {"priority", [](Task& t) { t.batch().priority(2); }},
       {"task.samples", [](Task& t) { t.samples({}); }},
       {"task.samples", [](Task& t) { t.samples({0, 7}); }},
       {"task.samples", [](Task& t) { t.samples(std::vector<std::uint32_t>(100'000, 0)); }},

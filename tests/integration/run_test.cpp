@@ -54,6 +54,15 @@ TEST_F(Run, GraspsTheTargetOfAnEasySceneAndTellsAll) {
   EXPECT_TRUE(run_folders().empty());
 }
 
+TEST_F(Run, PinnedWorkersFindTheSamePlan) {
+  const auto plan_with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {easy, "--plan-only", "--parameters", plain, "--json", result_file()});
+    EXPECT_EQ(finish(more), 0) << run->err();
+    return result()["plan_hash"];
+  };
+  EXPECT_EQ(plan_with({"--workers", "auto", "--pin"}), plan_with({"--workers", "1"}));
+}
+
 // Every process of it: coordinator, simulated world, two workers.
 TEST_F(Run, PushesTheTargetToItsGoalAndTellsAll) {
   const auto scene = folder.write("push.yaml", physics_pool::to_yaml(push_ahead()));

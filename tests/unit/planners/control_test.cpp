@@ -285,6 +285,16 @@ TEST_F(OnlineReplanning, ReplansAfterEveryActionWhileNoGraspIsPredicted) {
   EXPECT_EQ(result.replans, 3);  // none before the first action, none after the last
 }
 
+TEST_F(OnlineReplanning, IsUrgentOnceTheRobotHasMoved) {
+  planner.predicts_goal = false;
+  grasp_after(3);
+  (void)outcome();
+  using physics_pool::Priority;
+  std::vector<Priority> priorities;
+  for (const Problem& problem : planner.problems) priorities.push_back(problem.priority);
+  EXPECT_THAT(priorities, testing::ElementsAre(Priority::kNormal, Priority::kUrgent, Priority::kUrgent));
+}
+
 TEST_F(OnlineReplanning, IteratesMoreWhileReplansFallShort) {
   planner.predicts_goal = false;
   options.few_iterations_max = 6;

@@ -42,6 +42,7 @@ RolloutBatch odd_batch() {
   batch.min_steps = 9;
   batch.want_all_trajectories = true;
   batch.fidelity = {.freeze = true, .time_step = 0.008};
+  batch.priority = Priority::kUrgent;
   batch.wait = std::chrono::nanoseconds(123456789);
   return batch;
 }
@@ -74,6 +75,7 @@ TEST(ConvertBatch, SurvivesTheWire) {
   EXPECT_EQ(got.want_all_trajectories, wanted.want_all_trajectories);
   EXPECT_EQ(got.stop_hopeless, wanted.stop_hopeless);
   EXPECT_EQ(got.fidelity, wanted.fidelity);
+  EXPECT_EQ(got.priority, wanted.priority);
   EXPECT_EQ(got.wait, wanted.wait);
 }
 

@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <map>
+
 namespace jostle::tests {
 namespace {
 
@@ -149,6 +151,59 @@ TEST_F(SchedulerTest, IdleWorkerCopiesWaitingSamplesFirst) {
   EXPECT_THAT(assigned_to(kBert), ElementsAre(0));
 }
 
+TEST_F(SchedulerTest, GivesMoreOfShortSamplesWhereOthersTakeTurns) {
+  hear(kAnna);
+  sut.start(kBatch, 0, 100);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(0, 1));
+  sut.accept(kAnna, kBatch, 0, 100, now, 1ms);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(2)) << "nobody else is there";
+
+  sut.heard({.worker = kAnna, .name = "w", .capacity = 1, .ready = true, .samples = 2, .others = 1}, now);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(3, 4, 5)) << "five of 1 ms outlast an exchange";
+
+  sut.heard({.worker = kAnna, .name = "w", .capacity = 1, .ready = true, .samples = 5, .others = 0}, now);
+  accept(kAnna, 1);
+  EXPECT_THAT(assigned_to(kAnna), IsEmpty());
+}
+
+TEST_F(SchedulerTest, GivesNoMoreOfLongSamplesWhereOthersTakeTurns) {
+  sut.heard({.worker = kAnna, .name = "w", .capacity = 2, .ready = true, .others = 5}, now);
+  sut.start(kBatch, 0, 100);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(0, 1, 2));
+  sut.accept(kAnna, kBatch, 0, 100, now, 60ms);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(3));
+}
+
+TEST_F(SchedulerTest, WorkerBusyWithOthersGetsNoCopies) {
+  hear(kAnna);
+  sut.start(kBatch, 0, 2);
+  sut.assign(now);
+  now += options.copy_after;
+  sut.heard({.worker = kBert, .name = "w", .capacity = 2, .ready = true, .others = 2}, now);
+  EXPECT_THAT(sut.assign(now), IsEmpty());
+
+  sut.heard({.worker = kBert, .name = "w", .capacity = 2, .ready = true, .others = 1}, now);
+
+  EXPECT_THAT(assigned_to(kBert), ElementsAre(1));
+}
+
+TEST_F(SchedulerTest, WaitsForASampleThatItsWorkerHasNoTurnFor) {
+  hear(kAnna);
+  hear(kBert);
+  sut.start(kBatch, 0, 2);
+  sut.assign(now);
+  for (int i = 0; i < 100; ++i) {  // ten seconds of others' urgent work
+    now += 100ms;
+    for (const WorkerId worker : {kAnna, kBert}) {
+      sut.heard({.worker = worker, .name = "w", .capacity = 1, .ready = true, .samples = 1, .others = 2}, now);
+    }
+    EXPECT_THAT(sut.check_silence(now), IsEmpty());
+    EXPECT_THAT(sut.assign(now), IsEmpty());
+  }
+  EXPECT_TRUE(accept(kAnna, 0));
+  EXPECT_EQ(sut.status().reissued, 0u);
+}
+
 TEST_F(SchedulerTest, NoSampleHasThreeCopies) {
   hear(kAnna);
   sut.start(kBatch, 0, 1);
@@ -186,6 +241,24 @@ TEST_F(SchedulerTest, BatchesTakeTurns) {
   ASSERT_THAT(assignments, SizeIs(2));
   EXPECT_THAT(assignments[0].samples, SizeIs(2));
   EXPECT_THAT(assignments[1].samples, SizeIs(2));
+}
+
+TEST_F(SchedulerTest, UrgentBatchGoesFirstAndTheNormalOneKeepsAnEighth) {
+  hear(kAnna, 15);
+  sut.start(kBatch, 0, 100);
+  sut.start(kOther, 0, 100, physics_pool::Priority::kUrgent);
+
+  std::map<Epoch, std::size_t> handed_out;
+  for (const Assignment& assignment : sut.assign(now)) handed_out[assignment.epoch] += assignment.samples.size();
+
+  EXPECT_EQ(handed_out[kBatch], 2u);
+  EXPECT_EQ(handed_out[kOther], 14u);
+}
+
+TEST_F(SchedulerTest, UrgentBatchAloneGetsEverything) {
+  hear(kAnna, 15);
+  sut.start(kOther, 0, 100, physics_pool::Priority::kUrgent);
+  EXPECT_THAT(assigned_to(kAnna), SizeIs(16));
 }
 
 TEST_F(SchedulerTest, FinishedBatchFreesItsWorkers) {

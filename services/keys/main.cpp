@@ -134,7 +134,7 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   add_days(add_keystore(command("init", "make a keystore, and identities named robot and worker", init)));
   add_days(add_name(add_keystore(command("issue", "make an identity", issue))))
       ->add_option("--role", arguments.role, "robot: everything; worker: the pool's topics; observer: hears "
-                                             "everything, says nothing; server: no topic (discovery server)")
+                                             "everything, says nothing; server: joins, no topic")
       ->check(CLI::IsMember({"robot", "worker", "observer", "server"}))->capture_default_str();
   add_name(add_keystore(command("revoke", "put an identity on the list of those who are refused", revoke)));
   add_keystore(command("list", "list what was issued: name, role, valid until, state", list))

@@ -14,7 +14,7 @@ enum class Role {
   kRobot,     ///< everything: coordinator, simulated world, run, bridge
   kWorker,    ///< the pool's topics: hears tasks, says results; no robot and no goal
   kObserver,  ///< hears everything, says nothing: recorders
-  kServer,    ///< no topic at all: a discovery server
+  kServer,    ///< joins, no topic at all. Meant for discovery servers, which Fast DDS 2.9.1 cannot protect
 };
 
 inline constexpr std::array kRoles{Role::kRobot, Role::kWorker, Role::kObserver, Role::kServer};

@@ -12,11 +12,12 @@ namespace jostle::services {
 namespace {
 
 // Sorted by name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kPurposes{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 11> kPurposes{{
     {"bench", "measure physics, pools and planners on this machine"},
     {"coordinator", "plan and re-plan with a pool of workers"},
     {"doctor", "say what is wrong with this machine, and the remedy"},
     {"experiment", "run a study of the thesis and write its figure or table"},
+    {"keys", "make, hand out and revoke identities for protected DDS"},
     {"render", "draw states of a scene as a picture"},
     {"run", "start everything for a scene on this machine"},
     {"scene", "make, check, disturb and show scene files"},

@@ -125,6 +125,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()->check(CLI::Range(1, 8));
   app.add_flag("--urgent", timeline.urgent, "Of pool: the last client's batches are urgent");
   app.add_flag("--pin", pin, "Of pool: give each worker a core of its own, in turn");
+  add_network_options(app);
   app.add_option("--domain", settings.domain, "DDS domain (default: one of 100 to 199, from the process id)")
       ->check(CLI::Range(0, 232));
   app.footer("Exit codes: 0 measured, 1 the two sides computed different things, 2 bad arguments,\n"

@@ -5,10 +5,13 @@
 #include <charconv>
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
 
 #include "idl/types/hash.hpp"
 #include "services/dds/core.hpp"
+#include "services/dds/security.hpp"
 
 namespace jostle::dds {
 namespace {
@@ -20,6 +23,9 @@ using eprosima::fastdds::dds::DomainParticipantQos;
 // Bytes; holds a burst of trajectories. The kernel gives less where
 // net.core.rmem_max is lower, and lost packets are then sent again.
 constexpr std::uint32_t kSocketBuffer = 4 << 20;
+// Processes per host that peers greet unasked; the middleware's default is 4. One more
+// than that is not found, and each costs a datagram per peer and announcement.
+constexpr std::uint32_t kPeersPerHost = 64;
 constexpr int kLargestDomain = 232;  // RTPS 2.2, 9.6.1.1: ports would pass 65535 beyond
 
 Result<int> choose_domain(const std::optional<int>& wanted) {
@@ -64,9 +70,48 @@ DomainParticipantQos make_qos(const std::string& name, Transport transport) {
     qos.transport().use_builtin_transports = false;
     const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
     udp->sendBufferSize = udp->receiveBufferSize = kSocketBuffer;
+    udp->maxInitialPeersRange = kPeersPerHost;
     qos.transport().user_transports.assign(1, udp);
   }
   return qos;
+}
+
+std::string environment(const char* variable) {
+  const char* text = std::getenv(variable);
+  return text ? text : "";
+}
+
+eprosima::fastrtps::rtps::Locator_t locator(const std::string& address, std::uint32_t port) {
+  eprosima::fastrtps::rtps::Locator_t result;
+  result.kind = LOCATOR_KIND_UDPv4;
+  eprosima::fastrtps::rtps::IPLocator::setIPv4(result, address);
+  result.port = port;  // 0: those that the domain's processes have
+  return result;
+}
+
+void find_by(const Discovery& discovery, DomainParticipantQos& qos) {
+  using eprosima::fastrtps::rtps::DiscoveryProtocol_t;
+  auto& builtin = qos.wire_protocol().builtin;
+  if (discovery.mode == Discovery::Mode::kPeers) {
+    builtin.initialPeersList.push_back(locator("127.0.0.1", 0));  // the other processes of this host
+    for (const Discovery::Host& host : discovery.hosts) builtin.initialPeersList.push_back(locator(host.address, 0));
+  }
+  if (discovery.mode == Discovery::Mode::kServer) {
+    builtin.discovery_config.discoveryProtocol = DiscoveryProtocol_t::CLIENT;
+    for (std::size_t i = 0; i < discovery.hosts.size(); ++i) {
+      eprosima::fastdds::rtps::RemoteServerAttributes server;
+      eprosima::fastdds::rtps::get_server_client_default_guidPrefix(static_cast<int>(i), server.guidPrefix);
+      server.metatrafficUnicastLocatorList.push_back(locator(discovery.hosts[i].address, discovery.hosts[i].port));
+      builtin.discovery_config.m_DiscoveryServers.push_back(server);
+    }
+  }
+}
+
+void serve(const ServerOptions& server, DomainParticipantQos& qos) {
+  auto& builtin = qos.wire_protocol().builtin;
+  builtin.discovery_config.discoveryProtocol = eprosima::fastrtps::rtps::DiscoveryProtocol_t::SERVER;
+  eprosima::fastdds::rtps::get_server_client_default_guidPrefix(server.id, qos.wire_protocol().prefix);
+  builtin.metatrafficUnicastLocatorList.push_back(locator(server.address, server.port));
 }
 
 }  // namespace
@@ -76,17 +121,38 @@ std::uint64_t participant_id(const eprosima::fastrtps::rtps::GUID_t& guid) {
   return hash_of(std::string_view(bytes, sizeof guid.guidPrefix.value)).low;
 }
 
-Result<Participant> Participant::open(const ParticipantOptions& options) {
+Result<Participant> Participant::open(const ParticipantOptions& options) { return create(options, nullptr); }
+
+Result<Participant> Participant::open_server(const ParticipantOptions& options, const ServerOptions& server) {
+  return create(options, &server);
+}
+
+Result<Participant> Participant::create(const ParticipantOptions& options, const ServerOptions* server) {
   auto domain_result = choose_domain(options.domain);
   if (!domain_result) return domain_result.error();
   auto transport_result = choose_transport(options.transport);
   if (!transport_result) return transport_result.error();
+  const std::string way = environment("JOSTLE_DISCOVERY"), identity = environment("JOSTLE_SECURE");
+  auto discovery_result = parse_discovery(way.empty() || server ? "multicast" : way);
+  if (!discovery_result) return discovery_result.error();
+  DomainParticipantQos qos = make_qos(options.name, *transport_result);
+  find_by(*discovery_result, qos);
+  if (server) serve(*server, qos);
+  if (!identity.empty()) {
+    if (server || discovery_result->mode == Discovery::Mode::kServer) {
+      return Error{Code::kInvalidArgument, "a discovery server on a protected domain: the middleware has none that works; "
+                                           "wanted --discovery multicast or peers:HOST,..., or no --secure (JOSTLE_SECURE)"};
+    }
+    if (auto ok = secure(qos, identity); !ok) return ok.error();
+  }
   DomainParticipant* participant = DomainParticipantFactory::get_instance()->create_participant(
-      static_cast<std::uint32_t>(*domain_result), make_qos(options.name, *transport_result));
+      static_cast<std::uint32_t>(*domain_result), qos);
   if (!participant) {
     return Error{Code::kUnavailable,
                  fmt::format("DDS domain {}: no participant could be created; check the network "
-                             "interfaces, /dev/shm and FASTRTPS_DEFAULT_PROFILES_FILE", *domain_result)};
+                             "interfaces, /dev/shm and FASTRTPS_DEFAULT_PROFILES_FILE{}", *domain_result,
+                             server ? fmt::format(", and that {}:{} is an address of this host and free", server->address,
+                                                  server->port) : "")};
   }
   return Participant(std::make_shared<Core>(participant, *domain_result));
 }

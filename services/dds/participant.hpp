@@ -9,6 +9,7 @@
 #include <string>
 
 #include "idl/types/result.hpp"
+#include "services/dds/discovery.hpp"
 
 namespace jostle::dds {
 
@@ -34,11 +35,24 @@ struct ParticipantOptions {
   std::optional<Transport> transport;
 };
 
+/// A discovery server: listens there, introduces participants to each other.
+struct ServerOptions {
+  std::string address = "0.0.0.0";  ///< IPv4 to listen at; 0.0.0.0: all of this host
+  std::uint16_t port = kServerPort;
+  int id = 0;                       ///< its place in the list of servers that clients are given
+};
+
 /// One per process: two can deadlock at shutdown (Fast DDS #6193). A copy is
 /// another handle to the same participant; writers and readers hold one, so
 /// everything may be destroyed in any order.
 ///
-/// Peers and the like come from the default profile of the file that
+/// Two more come from the environment, which the programs this one starts inherit; programs
+/// set it by the options --discovery and --secure:
+///
+///   JOSTLE_DISCOVERY  see parse_discovery(); else multicast
+///   JOSTLE_SECURE     identity folder, see security::open_identity(); else unprotected
+///
+/// The rest comes from the default profile of the file that
 /// FASTRTPS_DEFAULT_PROFILES_FILE names, if any. The lease (2 s) and the
 /// announcement period (500 ms) are set here: the middleware's defaults give
 /// joins of 3 s and stalls of 20 s.
@@ -46,9 +60,14 @@ struct ParticipantOptions {
 /// Threads  safe from any thread.
 class Participant {
  public:
-  /// Errors   kInvalidArgument  the domain or the transport; says where it came from
+  /// Errors   kInvalidArgument  domain, transport, discovery or identity; says where it came from
+  ///          kNotFound, kIo    a host, a file of the identity
   ///          kUnavailable      the middleware refused
   static Result<Participant> open(const ParticipantOptions& options);
+
+  /// The same as a discovery server. Unprotected only: on a protected domain the
+  /// server of Fast DDS 2.9.1 aborts.
+  static Result<Participant> open_server(const ParticipantOptions& options, const ServerOptions& server);
 
   int domain() const;
 
@@ -61,6 +80,8 @@ class Participant {
 
  private:
   explicit Participant(std::shared_ptr<Core> core) : core_(std::move(core)) {}
+
+  static Result<Participant> create(const ParticipantOptions& options, const ServerOptions* server);
 
   std::shared_ptr<Core> core_;
 };

@@ -12,9 +12,10 @@ namespace jostle::services {
 namespace {
 
 // Sorted by name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 11> kPurposes{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kPurposes{{
     {"bench", "measure physics, pools and planners on this machine"},
     {"coordinator", "plan and re-plan with a pool of workers"},
+    {"discovery-server", "introduce machines to each other where there is no multicast"},
     {"doctor", "say what is wrong with this machine, and the remedy"},
     {"experiment", "run a study of the thesis and write its figure or table"},
     {"keys", "make, hand out and revoke identities for protected DDS"},

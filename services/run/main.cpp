@@ -104,6 +104,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()->check(CLI::Range(0.0, 1000.0));
   app.add_flag("--plan-only", options.plan_only, "Stop after the first plan");
   app.add_flag("--headless", options.headless, "Plain lines instead of a live display");
+  add_network_options(app);
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.footer("Exit codes: 0 grasped or pushed to its goal, 1 not, 2 bad input, 3 a part of the system failed, 130 interrupted.");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;

@@ -1,6 +1,7 @@
 #include "services/support/program.hpp"
 
 #include <csignal>
+#include <cstdlib>
 #include <pthread.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -8,6 +9,8 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <condition_variable>
+#include <mutex>
 #include <thread>
 
 namespace jostle::services {
@@ -45,13 +48,32 @@ StopSignal::StopSignal() {
 
 std::stop_token StopSignal::token() const { return stop_source().get_token(); }
 
+void StopSignal::wait() const {
+  std::mutex unshared;
+  std::condition_variable_any stopped;
+  std::unique_lock lock(unshared);
+  stopped.wait(lock, token(), [] { return false; });
+}
+
 void die_with_parent(pid_t parent) {
   if (parent == 0) return;
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (getppid() != parent) raise(SIGTERM);  // it ended before we asked
 }
 
+void add_network_options(CLI::App& app) {
+  const auto sets = [](const char* variable) {
+    return [variable](const std::string& text) { setenv(variable, text.c_str(), 1); };
+  };
+  app.add_option_function<std::string>("--discovery", sets("JOSTLE_DISCOVERY"),
+                                       "How processes find each other: multicast, peers:HOST,HOST,... or\n"
+                                       "server:HOST[:PORT] (default: JOSTLE_DISCOVERY, else multicast)");
+  app.add_option_function<std::string>("--secure", sets("JOSTLE_SECURE"),
+                                       "Identity folder made by `jostle keys` (default: JOSTLE_SECURE, else unprotected)");
+}
+
 void add_process_options(CLI::App& app, ProcessOptions& options) {
+  add_network_options(app);
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.add_option("--die-with-parent", options.parent, "Process id of the starter: end when it ends");
 }

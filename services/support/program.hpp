@@ -33,13 +33,20 @@ class StopSignal {
   StopSignal& operator=(const StopSignal&) = delete;
 
   std::stop_token token() const;
+
+  /// Returns once a stop was requested.
+  void wait() const;
 };
 
 /// Ends this process when the one that started it ends, however it ends; at once
 /// if that has happened already. `parent`: its process id; 0 does nothing.
 void die_with_parent(pid_t parent);
 
-/// What every process of a run can be told.
+/// --discovery and --secure, of every program that speaks DDS. They set JOSTLE_DISCOVERY and
+/// JOSTLE_SECURE of this process: so whatever it starts joins in the same way.
+void add_network_options(CLI::App& app);
+
+/// What every process of a run can be told, add_network_options() included.
 struct ProcessOptions {
   std::optional<int> domain;  ///< of DDS; else ROS_DOMAIN_ID, else 0
   pid_t parent = 0;           ///< see die_with_parent

@@ -4,8 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <condition_variable>
-#include <mutex>
 
 #include "services/pool_remote/worker_service.hpp"
 #include "services/support/cores.hpp"
@@ -16,14 +14,7 @@ namespace {
 using namespace jostle;
 using namespace jostle::services;
 
-void wait_for(std::stop_token stop) {
-  std::mutex mutex;
-  std::condition_variable_any stopped;
-  std::unique_lock lock(mutex);
-  stopped.wait(lock, stop, [] { return false; });
-}
-
-int serve(const dds::ParticipantOptions& dds_options, const WorkerOptions& options, std::stop_token stop) {
+int serve(const dds::ParticipantOptions& dds_options, const WorkerOptions& options, const StopSignal& signal) {
   auto participant_result = dds::Participant::open(dds_options);
   if (!participant_result) {
     spdlog::error("{}", participant_result.error().message);
@@ -32,7 +23,7 @@ int serve(const dds::ParticipantOptions& dds_options, const WorkerOptions& optio
   WorkerService worker(*participant_result, options);
   const std::string where = options.cores.empty() ? "" : fmt::format(", on cores {}", fmt::join(options.cores, ", "));
   spdlog::info("{}: {} rollouts at a time{}, domain {}", worker.name(), options.threads, where, participant_result->domain());
-  wait_for(std::move(stop));
+  signal.wait();
   return kExitOk;
 }
 
@@ -79,7 +70,7 @@ int main(int argc, char** argv) {
   const StopSignal signal;
   set_up_logging("worker");
   try {
-    return serve(dds_options, options, signal.token());
+    return serve(dds_options, options, signal);
   } catch (const std::exception& error) {  // the middleware's SetupError, a core that was taken away
     spdlog::error("{}", error.what());
     return kExitBroken;

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -36,8 +38,26 @@ Result<planners::ControlOptions::Method> parse_controller(const std::string& nam
                                                    task.kind, task.is_push() ? "mpc" : "or, nr")};
 }
 
+using Rollouts = std::map<std::string, std::uint64_t>;  // by worker
+
+Rollouts rollouts_of(const physics_pool::PoolStatus& pool) {
+  Rollouts rollouts;
+  for (const physics_pool::WorkerStatus& worker : pool.workers) rollouts[worker.name] += worker.rollouts;
+  return rollouts;
+}
+
+// What they did meanwhile; without those that did nothing.
+Rollouts since(const Rollouts& before, Rollouts now) {
+  for (auto& [name, count] : now) {
+    const auto found = before.find(name);
+    if (found != before.end()) count -= std::min(count, found->second);
+  }
+  std::erase_if(now, [](const auto& entry) { return entry.second == 0; });
+  return now;
+}
+
 // What the asker puts into result.json and draws.
-std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::uint64_t seed) {
+std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::uint64_t seed, const Rollouts& used) {
   const planners::Plan& plan = outcome.first_plan;
   nlohmann::json report{{"success", outcome.success},
                         {"reason", outcome.reason},
@@ -52,6 +72,7 @@ std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::
                         {"planning_seconds", outcome.planning_time.count()},
                         {"total_seconds", outcome.total_time.count()},
                         {"rollouts", outcome.rollouts},
+                        {"used_workers", used},
                         {"dropped_objects", outcome.dropped},
                         {"plan_states", nlohmann::json::array()},
                         {"observed_states", nlohmann::json::array()}};
@@ -104,6 +125,7 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   });
   jostle_msgs::msg::GoalResult result;
   result.goal_id(goal.goal_id());
+  const Rollouts before = rollouts_of(pool_.status());
   {
     const std::jthread refuser([this](std::stop_token own) { refuse_goals_meanwhile(own); });
     auto task_result = prepare(goal);
@@ -112,7 +134,8 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
     if (outcome_result) {
       result.success(outcome_result->success);
       result.reason(outcome_result->reason);
-      result.report(report_of(*outcome_result, physics_pool::scene_hash(task_result->execution), goal.seed()));
+      result.report(report_of(*outcome_result, physics_pool::scene_hash(task_result->execution), goal.seed(),
+                              since(before, rollouts_of(pool_.status()))));
     } else {
       const Error& error = outcome_result.error();
       result.reason(error.code == Code::kCancelled ? "cancelled" : "the system failed");

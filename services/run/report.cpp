@@ -60,7 +60,7 @@ void print_summary(const json& report) {
   fmt::print("  execution    {} actions, {} re-plans, {:.1f} s in all\n", report["actions"].get<int>(),
              report["replans"].get<int>(), report["total_seconds"].get<double>());
   fmt::print("  physics      {} rollouts, {} x {} ({})\n", report["rollouts"].get<std::uint64_t>(),
-             report["workers"].get<int>(), report["pool"].get<std::string>() == "dds" ? "worker process" : "thread",
+             report["used_workers"].size(), report["pool"].get<std::string>() == "dds" ? "worker process" : "thread",
              report["controller"].get<std::string>());
 }
 

@@ -1,9 +1,14 @@
 #include "services/dds/participant.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <charconv>
 #include <cstdlib>
+#include <cstring>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -107,6 +112,21 @@ void find_by(const Discovery& discovery, DomainParticipantQos& qos) {
   }
 }
 
+// The middleware creates a server that nobody reaches, and says nothing.
+Result<void> check_address(const ServerOptions& server) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(server.port);
+  const int handle = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const bool ok = inet_pton(AF_INET, server.address.c_str(), &address.sin_addr) == 1 && handle >= 0 &&
+                  bind(handle, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  const std::string problem = std::strerror(errno);
+  if (handle >= 0) close(handle);
+  if (ok) return {};
+  return Error{Code::kUnavailable, fmt::format("{}:{}: {}; wanted an address of this host (`ip address`) and a free port",
+                                               server.address, server.port, problem)};
+}
+
 void serve(const ServerOptions& server, DomainParticipantQos& qos) {
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.discoveryProtocol = eprosima::fastrtps::rtps::DiscoveryProtocol_t::SERVER;
@@ -137,7 +157,10 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
   if (!discovery_result) return discovery_result.error();
   DomainParticipantQos qos = make_qos(options.name, *transport_result);
   find_by(*discovery_result, qos);
-  if (server) serve(*server, qos);
+  if (server) {
+    if (auto ok = check_address(*server); !ok) return ok.error();
+    serve(*server, qos);
+  }
   if (!identity.empty()) {
     if (server || discovery_result->mode == Discovery::Mode::kServer) {
       return Error{Code::kInvalidArgument, "a discovery server on a protected domain: the middleware has none that works; "
@@ -150,9 +173,7 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
   if (!participant) {
     return Error{Code::kUnavailable,
                  fmt::format("DDS domain {}: no participant could be created; check the network "
-                             "interfaces, /dev/shm and FASTRTPS_DEFAULT_PROFILES_FILE{}", *domain_result,
-                             server ? fmt::format(", and that {}:{} is an address of this host and free", server->address,
-                                                  server->port) : "")};
+                             "interfaces, /dev/shm and FASTRTPS_DEFAULT_PROFILES_FILE", *domain_result)};
   }
   return Participant(std::make_shared<Core>(participant, *domain_result));
 }

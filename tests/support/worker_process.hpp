@@ -4,6 +4,8 @@
 
 #include <signal.h>
 #include <spawn.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -26,7 +28,24 @@ Clock::time_point in(Duration time) {
 }
 
 /// A DDS domain that no other test process on this machine uses, 100 to 199.
-inline int test_domain() { return 100 + static_cast<int>(getpid() % 100); }
+inline int test_domain() {
+  static const int domain = [] {
+    // A bound socket without a file, held until the process ends: of tests that run side by
+    // side, process ids a multiple of 100 apart do occur.
+    for (int i = 0; i < 100; ++i) {
+      const int candidate = 100 + static_cast<int>((getpid() + i) % 100);
+      sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+      const std::string name = "jostle-test/" + std::to_string(candidate);
+      name.copy(address.sun_path + 1, sizeof(address.sun_path) - 1);
+      const int handle = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+      const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+      if (bind(handle, reinterpret_cast<const sockaddr*>(&address), size) == 0) return candidate;
+      close(handle);
+    }
+    throw std::runtime_error("no DDS domain from 100 to 199 is free");
+  }();
+  return domain;
+}
 
 /// Whether a condition came true by the deadline.
 inline bool eventually(Clock::time_point deadline, const std::function<bool()>& condition) {

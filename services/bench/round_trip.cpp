@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <condition_variable>
-#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -161,10 +159,7 @@ int serve_echo(int domain, std::stop_token stop) {
     result.epoch(task.epoch());
     pong.write(result);
   });
-  std::mutex unshared;
-  std::condition_variable_any never;
-  std::unique_lock lock(unshared);
-  never.wait(lock, stop, [] { return false; });
+  wait_for(std::move(stop));
   return kExitOk;
 }
 

@@ -32,6 +32,6 @@ int main(int argc, char** argv) {
     return participant_result.error().code == Code::kInvalidArgument ? kExitUsage : kExitBroken;
   }
   spdlog::info("listens at {}:{}, domain {}", server.address, server.port, participant_result->domain());
-  signal.wait();
+  wait_for(signal.token());
   return kExitOk;
 }

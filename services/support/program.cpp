@@ -12,6 +12,7 @@
 #include <condition_variable>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 namespace jostle::services {
 namespace {
@@ -48,11 +49,11 @@ StopSignal::StopSignal() {
 
 std::stop_token StopSignal::token() const { return stop_source().get_token(); }
 
-void StopSignal::wait() const {
+void wait_for(std::stop_token stop) {
   std::mutex unshared;
   std::condition_variable_any stopped;
   std::unique_lock lock(unshared);
-  stopped.wait(lock, token(), [] { return false; });
+  stopped.wait(lock, std::move(stop), [] { return false; });
 }
 
 void die_with_parent(pid_t parent) {

@@ -33,10 +33,10 @@ class StopSignal {
   StopSignal& operator=(const StopSignal&) = delete;
 
   std::stop_token token() const;
-
-  /// Returns once a stop was requested.
-  void wait() const;
 };
+
+/// Returns once a stop was requested.
+void wait_for(std::stop_token stop);
 
 /// Ends this process when the one that started it ends, however it ends; at once
 /// if that has happened already. `parent`: its process id; 0 does nothing.

@@ -14,7 +14,7 @@ namespace {
 using namespace jostle;
 using namespace jostle::services;
 
-int serve(const dds::ParticipantOptions& dds_options, const WorkerOptions& options, const StopSignal& signal) {
+int serve(const dds::ParticipantOptions& dds_options, const WorkerOptions& options, std::stop_token stop) {
   auto participant_result = dds::Participant::open(dds_options);
   if (!participant_result) {
     spdlog::error("{}", participant_result.error().message);
@@ -23,7 +23,7 @@ int serve(const dds::ParticipantOptions& dds_options, const WorkerOptions& optio
   WorkerService worker(*participant_result, options);
   const std::string where = options.cores.empty() ? "" : fmt::format(", on cores {}", fmt::join(options.cores, ", "));
   spdlog::info("{}: {} rollouts at a time{}, domain {}", worker.name(), options.threads, where, participant_result->domain());
-  signal.wait();
+  wait_for(std::move(stop));
   return kExitOk;
 }
 
@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
   const StopSignal signal;
   set_up_logging("worker");
   try {
-    return serve(dds_options, options, signal);
+    return serve(dds_options, options, signal.token());
   } catch (const std::exception& error) {  // the middleware's SetupError, a core that was taken away
     spdlog::error("{}", error.what());
     return kExitBroken;

@@ -4,8 +4,6 @@
 
 #include <signal.h>
 #include <spawn.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,6 +14,8 @@
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "services/support/domain_claim.hpp"
 
 namespace jostle::tests {
 
@@ -29,18 +29,13 @@ Clock::time_point in(Duration time) {
 
 /// A DDS domain that no other test process on this machine uses, 100 to 199.
 inline int test_domain() {
-  static const int domain = [] {
-    // A bound socket without a file, held until the process ends: of tests that run side by
-    // side, process ids a multiple of 100 apart do occur.
+  // Held until the process ends: of tests that run side by side, process ids a multiple of
+  // 100 apart do occur.
+  static const auto [domain, claim] = [] {
     for (int i = 0; i < 100; ++i) {
       const int candidate = 100 + static_cast<int>((getpid() + i) % 100);
-      sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
-      const std::string name = "jostle-test/" + std::to_string(candidate);
-      name.copy(address.sun_path + 1, sizeof(address.sun_path) - 1);
-      const int handle = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-      const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
-      if (bind(handle, reinterpret_cast<const sockaddr*>(&address), size) == 0) return candidate;
-      close(handle);
+      auto claim_result = services::DomainClaim::take("test", candidate, std::chrono::milliseconds(0));
+      if (claim_result) return std::pair(candidate, std::move(claim_result).value());
     }
     throw std::runtime_error("no DDS domain from 100 to 199 is free");
   }();

@@ -9,13 +9,20 @@ namespace jostle::dds {
 struct Qos {
   bool reliable = true;
   bool latched = false;  ///< transient-local: late readers get the last samples
+  /// The writer keeps its last samples for late readers that ask, as recorders do; the
+  /// system's own readers of the topic do not.
+  bool retained = false;
   int depth = 10;        ///< samples kept per instance (keep-last)
   int instances = 1;     ///< most keys of a keyed type; the middleware's default is 10
+
+  bool operator==(const Qos&) const = default;
 };
 
 /// Commands and requests, each of which matters. The depth holds a burst to one
 /// peer, so that a slow peer is never the reason to block the writer.
 inline constexpr Qos kTask{.depth = 512};
+/// The same where a recorder that comes late wants the whole story.
+inline constexpr Qos kCommand{.retained = true, .depth = 512};
 /// Answers to requests: an asker whose reader the answerer has not found yet
 /// gets them when it is found. Who asked sorts out what is its own.
 inline constexpr Qos kAnswer{.latched = true, .depth = 16};
@@ -23,8 +30,8 @@ inline constexpr Qos kAnswer{.latched = true, .depth = 16};
 inline constexpr Qos kLatched{.latched = true, .depth = 1};
 /// Newest sample wins; a lost one is not worth repeating.
 inline constexpr Qos kStream{.reliable = false, .depth = 1};
-/// States that people and recorders follow.
-inline constexpr Qos kState{};
+/// States that people and recorders follow. What is kept covers a recorder's discovery.
+inline constexpr Qos kState{.retained = true};
 /// One latched sample per key.
 inline constexpr Qos kCatalogue{.latched = true, .depth = 1, .instances = 4096};
 

@@ -17,11 +17,14 @@ inline const Topic<tf2_msgs::msg::TFMessage> kTransforms{"rt/tf", dds::kState};
 inline const Topic<geometry_msgs::msg::PoseArray> kObjectPoses{"rt/objects/poses", dds::kState};
 inline const Topic<msg::ObjectStates> kObjectStates{"rt/objects/states", dds::kState};
 
-inline const Topic<msg::VelocityCommand> kRobotCommand{"rt/robot/command", dds::kTask};
+inline const Topic<msg::VelocityCommand> kRobotCommand{"rt/robot/command", dds::kCommand};
 inline const Topic<msg::RobotStatus> kRobotStatus{"rt/robot/status", dds::kState};
 
-inline const Topic<msg::Goal> kTaskGoal{"rt/task/goal", dds::kTask};
-inline const Topic<msg::Cancel> kTaskCancel{"rt/task/cancel", dds::kTask};
+inline const Topic<msg::Goal> kTaskGoal{"rt/task/goal", dds::kCommand};
+inline const Topic<msg::Cancel> kTaskCancel{"rt/task/cancel", dds::kCommand};
+inline const Topic<msg::TaskRun> kTaskRun{"rt/task/run", dds::kLatched};
+inline const Topic<msg::Observation> kTaskObservation{"rt/task/observation", dds::kCommand};
+inline const Topic<msg::Plan> kTaskPlan{"rt/task/plan", dds::kCommand};
 inline const Topic<msg::Feedback> kTaskFeedback{"rt/task/feedback", dds::kState};
 inline const Topic<msg::GoalResult> kTaskResult{"rt/task/result", dds::kAnswer};
 

@@ -15,6 +15,7 @@ using namespace eprosima::fastdds::dds;
 DataWriterQos writer_qos(const Participant::Core& core, const Qos& qos) {
   DataWriterQos result = core.publisher->get_default_datawriter_qos();
   apply(qos, result);
+  if (qos.retained) result.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
   result.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
   // A lost last packet is noticed by the next heartbeat; the default is 3 s.
   result.reliable_writer_qos().times.heartbeatPeriod = {0, 100'000'000};

@@ -81,4 +81,10 @@ Result<planners::Plan> Journal::Planner::plan(const planners::Problem& problem, 
   return plan_result;
 }
 
+robot_bridge::RobotReading reading_of(const jostle_msgs::msg::Observation& seen) {
+  robot_bridge::RobotReading reading{.q = seen.q(), .v = seen.v()};
+  if (seen.in_hand() != kCannotTell) reading.object_in_hand = seen.in_hand() == kObject;
+  return reading;
+}
+
 }  // namespace jostle::services

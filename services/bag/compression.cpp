@@ -24,8 +24,8 @@ struct Step {
 // that a damaged file claims costs nothing.
 template <class StepFunction>
 std::optional<Bytes> run(View data, std::uint64_t size, StepFunction step) {
-  constexpr std::uint64_t kFirst = 4 << 20;
-  Bytes out(static_cast<std::size_t>(std::min(size, std::max<std::uint64_t>(kFirst, 2 * data.size()))));
+  constexpr std::uint64_t kFirst = 256 << 10;
+  Bytes out(static_cast<std::size_t>(std::min(size, std::max<std::uint64_t>(kFirst, 8 * data.size()))));
   std::size_t filled = 0;
   bool is_done = data.empty();
   std::byte nothing{};  // decompressors want a place to write to even when nothing is left

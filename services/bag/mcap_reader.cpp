@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <limits>
 #include <queue>
-#include <set>
 #include <tuple>
 
 #include "services/bag/checksum.hpp"
@@ -32,8 +31,9 @@ struct Block {
   std::uint64_t stored = 0, size = 0;    // of a chunk's records
   std::string compression;
   Time start = 0, end = 0;
-  std::set<std::uint16_t> channels;  // that have messages in it,
-  bool knows_channels = true;        // if this says so
+  /// Channels that have messages in it, if knows_channels; how many, if a scan has counted.
+  std::map<std::uint16_t, std::uint64_t> channels;
+  bool knows_channels = true;
 };
 
 // A message in a loaded block.
@@ -72,6 +72,7 @@ class McapReader final : public FileReader {
       blocks_.clear();
       recovers_ = true;
       read = scan(file_.size());
+      leave_out_strays();
     }
     if (!read) return read;
     if (options_.skip_repeated && !blocks_.empty()) leave_out_repeated();
@@ -312,7 +313,7 @@ class McapReader final : public FileReader {
     Block block{.offset = index.offset, .length = index.length, .stored = index.stored, .size = index.size,
                 .compression = index.compression, .start = *start_result, .end = *end_result,
                 .knows_channels = !index.message_indexes.empty()};
-    for (const auto& [channel, offset] : index.message_indexes) block.channels.insert(channel);
+    for (const auto& [channel, offset] : index.message_indexes) block.channels[channel] = 0;
     blocks_.push_back(std::move(block));
     return {};
   }
@@ -527,10 +528,8 @@ class McapReader final : public FileReader {
     block.start = earliest;
     block.end = latest;
     block.knows_channels = true;
-    for (const auto& [channel, count] : counts) {
-      block.channels.insert(channel);
-      counts_[channel] += count;
-    }
+    for (const auto& [channel, count] : counts) counts_[channel] += count;
+    block.channels = std::move(counts);
     blocks_.push_back(std::move(block));
     return {};
   }
@@ -621,16 +620,16 @@ class McapReader final : public FileReader {
 
   bool may_have(const Block& block, int topic) const {
     if (!block.knows_channels) return true;
-    return std::ranges::any_of(block.channels, [&](std::uint16_t channel) {
-      const auto known = topics_.find(channel);
+    return std::ranges::any_of(block.channels, [&](const auto& channel) {
+      const auto known = topics_.find(channel.first);
       return known == topics_.end() || known->second == topic;  // unknown: load() says what is wrong
     });
   }
 
   bool may_have_wanted(const Block& block) const {
     if (wanted_.empty() || !block.knows_channels) return true;
-    return std::ranges::any_of(block.channels, [&](std::uint16_t channel) {
-      const auto known = topics_.find(channel);
+    return std::ranges::any_of(block.channels, [&](const auto& channel) {
+      const auto known = topics_.find(channel.first);
       return known == topics_.end() || wanted_[static_cast<std::size_t>(known->second)];
     });
   }
@@ -661,11 +660,22 @@ class McapReader final : public FileReader {
     return true;
   }
 
+  // Files with chunks have all messages in them, under checksums: what looks like one outside
+  // is something else that was damaged.
+  void leave_out_strays() {
+    if (std::ranges::none_of(blocks_, &Block::is_chunk)) return;
+    for (const Block& block : blocks_) {
+      if (block.is_chunk) continue;
+      for (const auto& [channel, count] : block.channels) counts_[channel] -= count;
+    }
+    std::erase_if(blocks_, [](const Block& block) { return !block.is_chunk; });
+  }
+
   // The first chunk, if the file says that it repeats others.
   void leave_out_repeated() {
     if (!repeated_at_) return;
     const auto first = std::ranges::min_element(blocks_, {}, &Block::offset);
-    for (const std::uint16_t channel : first->channels) {
+    for (const auto& [channel, unused] : first->channels) {
       if (const auto count = counts_.find(channel); count != counts_.end() && count->second > 0) --count->second;
     }
     blocks_.erase(first);

@@ -2,6 +2,9 @@
 /// \file
 /// What participant, writers and readers share. For the .cpp files of this room.
 
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
@@ -9,6 +12,7 @@
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <map>
 #include <mutex>
+#include <vector>
 
 #include "services/dds/participant.hpp"
 #include "services/dds/qos.hpp"
@@ -39,6 +43,51 @@ class Participant::Core {
  private:
   std::mutex mutex_;  // guards users_ and the creation of topics
   std::map<std::string, int> users_;
+};
+
+/// Who is at the other end of a writer or reader: the endpoints that the middleware matched
+/// with it. Threads: any.
+class Peers {
+ public:
+  using Guid = eprosima::fastrtps::rtps::GUID_t;
+
+  /// `change` as in the middleware's matched statuses: positive came, negative went.
+  void update(const Guid& peer, int change) {
+    const std::lock_guard lock(mutex_);
+    if (change > 0) {
+      peers_.push_back(peer);
+    } else {
+      std::erase(peers_, peer);
+    }
+    changed_.notify_all();
+  }
+
+  int count() const {
+    const std::lock_guard lock(mutex_);
+    return static_cast<int>(peers_.size());
+  }
+
+  bool wait_for(int count, std::chrono::steady_clock::time_point deadline) const {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_until(lock, deadline, [&] { return static_cast<int>(peers_.size()) >= count; });
+  }
+
+  /// Ascending, each once.
+  std::vector<std::uint64_t> participants() const {
+    std::vector<std::uint64_t> ids;
+    {
+      const std::lock_guard lock(mutex_);
+      for (const Guid& peer : peers_) ids.push_back(participant_id(peer));
+    }
+    std::ranges::sort(ids);
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return ids;
+  }
+
+ private:
+  mutable std::mutex mutex_;  // guards peers_
+  mutable std::condition_variable changed_;
+  std::vector<Guid> peers_;
 };
 
 /// The part of a Qos that writers and readers write the same way.

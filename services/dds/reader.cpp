@@ -22,7 +22,7 @@ DataReaderQos reader_qos(const Participant::Core& core, const Qos& qos) {
 }  // namespace
 
 struct ReaderBase::Impl : DataReaderListener {
-  Impl(Participant owner, TypeSupport type_support, std::function<void(const void*)> callback)
+  Impl(Participant owner, TypeSupport type_support, std::function<void(const void*, std::uint64_t)> callback)
       : participant(std::move(owner)), type(std::move(type_support)), on_sample(std::move(callback)) {}
 
   void on_data_available(DataReader* source) override {
@@ -31,15 +31,19 @@ struct ReaderBase::Impl : DataReaderListener {
     SampleInfo info;
     // The mutex is not held while taking: the middleware has locks of its own.
     while (source->take_next_sample(sample.get(), &info) == ReturnCode_t::RETCODE_OK) {
-      if (info.valid_data) call(sample.get());
+      if (info.valid_data) call(sample.get(), participant_id(iHandle2GUID(info.publication_handle)));
     }
   }
 
-  void call(const void* sample) {
+  void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
+    writers.update(iHandle2GUID(status.last_publication_handle), status.current_count_change);
+  }
+
+  void call(const void* sample, std::uint64_t writer) {
     const std::lock_guard lock(mutex);
     if (closed) return;
     try {
-      on_sample(sample);
+      on_sample(sample, writer);
     } catch (const std::exception& error) {
       fmt::print(stderr, "{}: a sample was dropped: {}\n", topic->get_name(), error.what());
     }
@@ -47,21 +51,22 @@ struct ReaderBase::Impl : DataReaderListener {
 
   Participant participant;
   TypeSupport type;
-  std::function<void(const void*)> on_sample;
+  std::function<void(const void*, std::uint64_t)> on_sample;
   eprosima::fastdds::dds::Topic* topic = nullptr;
   DataReader* reader = nullptr;
+  Peers writers;
 
   std::mutex mutex;  // guards closed; held during a callback, so one runs at a time
   bool closed = false;
 };
 
 ReaderBase::ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos,
-                       TypeSupport type, std::function<void(const void*)> on_sample)
+                       TypeSupport type, std::function<void(const void*, std::uint64_t)> on_sample)
     : impl_(std::make_unique<Impl>(participant, type, std::move(on_sample))) {
   Participant::Core& core = participant.core();
   impl_->topic = core.acquire_topic(topic, type);
   impl_->reader = core.subscriber->create_datareader(impl_->topic, reader_qos(core, qos), impl_.get(),
-                                                     StatusMask::data_available());
+                                                     StatusMask::data_available() << StatusMask::subscription_matched());
   if (impl_->reader) return;
   core.release_topic(impl_->topic);
   throw SetupError("topic " + topic + ": the middleware refused a reader");
@@ -78,10 +83,8 @@ ReaderBase::~ReaderBase() {
   core.release_topic(impl_->topic);
 }
 
-int ReaderBase::matched() const {
-  SubscriptionMatchedStatus status;
-  impl_->reader->get_subscription_matched_status(status);
-  return status.current_count;
-}
+int ReaderBase::matched() const { return impl_->writers.count(); }
+
+std::vector<std::uint64_t> ReaderBase::matched_participants() const { return impl_->writers.participants(); }
 
 }  // namespace jostle::dds

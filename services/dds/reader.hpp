@@ -21,10 +21,11 @@ namespace jostle::dds {
 /// Everything about a reader that does not depend on its type.
 class ReaderBase {
  public:
-  /// `on_sample` gets a sample of the topic's type. Throws SetupError.
+  /// `on_sample` gets a sample of the topic's type, and Participant::id() of who wrote it.
+  /// Throws SetupError.
   ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos,
              eprosima::fastdds::dds::TypeSupport type,
-             std::function<void(const void* sample)> on_sample);
+             std::function<void(const void* sample, std::uint64_t writer)> on_sample);
   /// Waits for a running callback; none runs afterwards.
   ~ReaderBase();
   ReaderBase(const ReaderBase&) = delete;
@@ -32,6 +33,9 @@ class ReaderBase {
 
   /// Writers found so far, and gone ones not counted.
   int matched() const;
+
+  /// Participant::id() of every one that has a writer for us; each once, ascending.
+  std::vector<std::uint64_t> matched_participants() const;
 
  private:
   struct Impl;
@@ -47,12 +51,18 @@ template <class T>
 class Reader : public ReaderBase {
  public:
   using OnSample = std::function<void(const T&)>;
+  using OnSampleOf = std::function<void(const T&, std::uint64_t writer)>;  ///< with Participant::id()
 
   Reader(const Participant& participant, const Topic<T>& topic, OnSample on_sample)
+      : Reader(participant, topic, OnSampleOf([on_sample = std::move(on_sample)](const T& sample, std::uint64_t) {
+                 on_sample(sample);
+               })) {}
+
+  Reader(const Participant& participant, const Topic<T>& topic, OnSampleOf on_sample)
       : ReaderBase(participant, topic.name, topic.qos,
                    eprosima::fastdds::dds::TypeSupport(new Serializer<T>()),
-                   [on_sample = std::move(on_sample)](const void* sample) {
-                     on_sample(*static_cast<const T*>(sample));
+                   [on_sample = std::move(on_sample)](const void* sample, std::uint64_t writer) {
+                     on_sample(*static_cast<const T*>(sample), writer);
                    }) {}
 };
 
@@ -65,7 +75,9 @@ class Inbox {
  public:
   Inbox(const Participant& participant, const Topic<T>& topic, std::size_t capacity)
       : capacity_(capacity),
-        reader_(participant, topic, [this](const T& sample) { put(sample); }) {}
+        reader_(participant, topic, typename Reader<T>::OnSampleOf([this](const T& sample, std::uint64_t writer) {
+                  put(sample, writer);
+                })) {}
 
   /// The oldest sample; waits for one until the deadline or a stop request.
   std::optional<T> take(TimePoint deadline, std::stop_token stop = {}) {
@@ -74,6 +86,13 @@ class Inbox {
     T sample = std::move(samples_.front());
     samples_.pop_front();
     return sample;
+  }
+
+  /// Participant::id() of who wrote the newest sample that arrived, taken or not; nothing
+  /// before the first.
+  std::optional<std::uint64_t> last_writer() const {
+    const std::lock_guard lock(mutex_);
+    return last_writer_;
   }
 
   /// Everything that is there, oldest first, without waiting.
@@ -88,9 +107,10 @@ class Inbox {
   }
 
   int matched() const { return reader_.matched(); }
+  std::vector<std::uint64_t> matched_participants() const { return reader_.matched_participants(); }
 
  private:
-  void put(const T& sample) {
+  void put(const T& sample, std::uint64_t writer) {
     {
       const std::lock_guard lock(mutex_);
       if (samples_.size() == capacity_) {
@@ -98,15 +118,17 @@ class Inbox {
         ++dropped_;
       }
       samples_.push_back(sample);
+      last_writer_ = writer;
     }
     arrived_.notify_one();
   }
 
   const std::size_t capacity_;
-  mutable std::mutex mutex_;  // guards samples_ and dropped_
+  mutable std::mutex mutex_;  // guards samples_, dropped_ and last_writer_
   std::condition_variable_any arrived_;
   std::deque<T> samples_;
   std::uint64_t dropped_ = 0;
+  std::optional<std::uint64_t> last_writer_;
   Reader<T> reader_;  // last: stops before what it fills is gone
 };
 

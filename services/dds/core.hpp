@@ -14,6 +14,7 @@
 #include <mutex>
 #include <vector>
 
+#include "services/dds/guid.hpp"
 #include "services/dds/participant.hpp"
 #include "services/dds/qos.hpp"
 
@@ -21,6 +22,8 @@ namespace jostle::dds {
 
 /// Of a GUID's first 12 bytes, which all entities of a participant share.
 std::uint64_t participant_id(const eprosima::fastrtps::rtps::GUID_t& guid);
+
+Guid to_guid(const eprosima::fastrtps::rtps::GUID_t& guid);
 
 class Participant::Core {
  public:
@@ -39,6 +42,7 @@ class Participant::Core {
   eprosima::fastdds::dds::Publisher* const publisher;
   eprosima::fastdds::dds::Subscriber* const subscriber;
   const int domain;
+  std::shared_ptr<EndpointWatch> watch;  // outlives the participant that calls it
 
  private:
   std::mutex mutex_;  // guards users_ and the creation of topics
@@ -90,6 +94,10 @@ class Peers {
   std::vector<Guid> peers_;
 };
 
+/// Samples that a reader keeps which keeps all: it only holds those whose predecessors are
+/// still on their way.
+inline constexpr int kMostKept = 1 << 16;
+
 /// The part of a Qos that writers and readers write the same way.
 template <class EndpointQos>
 void apply(const Qos& qos, EndpointQos& endpoint) {
@@ -103,6 +111,12 @@ void apply(const Qos& qos, EndpointQos& endpoint) {
   endpoint.resource_limits().max_samples = qos.depth * qos.instances;
   // Room for one sample; the rest is allocated when it is needed.
   endpoint.resource_limits().allocated_samples = 1;
+  if (qos.depth == kKeepAll) {
+    endpoint.history().kind = KEEP_ALL_HISTORY_QOS;
+    endpoint.history().depth = 1;  // means nothing, and must not be 0
+    endpoint.resource_limits().max_samples_per_instance = kMostKept;
+    endpoint.resource_limits().max_samples = 0;  // no limit of their sum
+  }
   endpoint.endpoint().history_memory_policy =
       eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   endpoint.data_sharing().off();

@@ -12,20 +12,35 @@
 #include <stop_token>
 #include <vector>
 
+#include "services/dds/guid.hpp"
 #include "services/dds/participant.hpp"
 #include "services/dds/topic.hpp"
 #include "services/dds/writer.hpp"
 
 namespace jostle::dds {
 
+/// Where a sample comes from.
+struct Origin {
+  std::uint64_t participant = 0;  ///< Participant::id() of who wrote it
+  Guid writer{};
+  std::uint64_t sequence = 0;     ///< of the writer, counting from 1: a gap is a lost sample
+  std::int64_t source_time = 0;   ///< when it was written, ns since the Unix epoch, on the writer's clock
+};
+
+/// What did not reach a reader, so far.
+struct ReaderTroubles {
+  std::uint64_t lost = 0;          ///< samples that the middleware gave up
+  std::uint64_t rejected = 0;      ///< had no room when they came; a reliable writer sends them again
+  std::uint64_t incompatible = 0;  ///< writers that offer less than is asked for
+};
+
 /// Everything about a reader that does not depend on its type.
 class ReaderBase {
  public:
-  /// `on_sample` gets a sample of the topic's type, and Participant::id() of who wrote it.
-  /// Throws SetupError.
+  /// `on_sample` gets a sample of the topic's type. Throws SetupError.
   ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos,
              eprosima::fastdds::dds::TypeSupport type,
-             std::function<void(const void* sample, std::uint64_t writer)> on_sample);
+             std::function<void(const void* sample, const Origin& origin)> on_sample);
   /// Waits for a running callback; none runs afterwards.
   ~ReaderBase();
   ReaderBase(const ReaderBase&) = delete;
@@ -36,6 +51,8 @@ class ReaderBase {
 
   /// Participant::id() of every one that has a writer for us; each once, ascending.
   std::vector<std::uint64_t> matched_participants() const;
+
+  ReaderTroubles troubles() const;
 
  private:
   struct Impl;
@@ -51,18 +68,18 @@ template <class T>
 class Reader : public ReaderBase {
  public:
   using OnSample = std::function<void(const T&)>;
-  using OnSampleOf = std::function<void(const T&, std::uint64_t writer)>;  ///< with Participant::id()
+  using OnSampleOf = std::function<void(const T&, const Origin&)>;
 
   Reader(const Participant& participant, const Topic<T>& topic, OnSample on_sample)
-      : Reader(participant, topic, OnSampleOf([on_sample = std::move(on_sample)](const T& sample, std::uint64_t) {
+      : Reader(participant, topic, OnSampleOf([on_sample = std::move(on_sample)](const T& sample, const Origin&) {
                  on_sample(sample);
                })) {}
 
   Reader(const Participant& participant, const Topic<T>& topic, OnSampleOf on_sample)
       : ReaderBase(participant, topic.name, topic.qos,
                    eprosima::fastdds::dds::TypeSupport(new Serializer<T>()),
-                   [on_sample = std::move(on_sample)](const void* sample, std::uint64_t writer) {
-                     on_sample(*static_cast<const T*>(sample), writer);
+                   [on_sample = std::move(on_sample)](const void* sample, const Origin& origin) {
+                     on_sample(*static_cast<const T*>(sample), origin);
                    }) {}
 };
 
@@ -75,8 +92,8 @@ class Inbox {
  public:
   Inbox(const Participant& participant, const Topic<T>& topic, std::size_t capacity)
       : capacity_(capacity),
-        reader_(participant, topic, typename Reader<T>::OnSampleOf([this](const T& sample, std::uint64_t writer) {
-                  put(sample, writer);
+        reader_(participant, topic, typename Reader<T>::OnSampleOf([this](const T& sample, const Origin& origin) {
+                  put(sample, origin.participant);
                 })) {}
 
   /// The oldest sample; waits for one until the deadline or a stop request.

@@ -74,6 +74,12 @@ bool WriterBase::reaches(std::uint64_t participant) const {
   return std::ranges::binary_search(impl_->readers.participants(), participant);
 }
 
+bool WriterBase::wait_until_received(TimePoint deadline) const {
+  const std::chrono::duration<double> time = deadline - std::chrono::steady_clock::now();
+  if (time.count() <= 0) return false;
+  return impl_->writer->wait_for_acknowledgments({static_cast<double>(time.count())}) == ReturnCode_t::RETCODE_OK;
+}
+
 bool WriterBase::write_sample(const void* data) {
   // The middleware only reads it; its signature predates const.
   return impl_->writer->write(const_cast<void*>(data));

@@ -40,6 +40,9 @@ class WriterBase {
   /// are no sign that whoever is to answer hears us.
   bool reaches(std::uint64_t participant) const;
 
+  /// Whether every reliable reader found so far had everything by the deadline.
+  bool wait_until_received(TimePoint deadline) const;
+
  protected:
   bool write_sample(const void* data);
 

@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstdlib>
@@ -13,9 +14,11 @@
 #include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
+#include <typeinfo>
 
 #include "idl/types/hash.hpp"
 #include "services/dds/core.hpp"
+#include "services/dds/endpoint_watch.hpp"
 #include "services/dds/security.hpp"
 
 namespace jostle::dds {
@@ -141,6 +144,13 @@ std::uint64_t participant_id(const eprosima::fastrtps::rtps::GUID_t& guid) {
   return hash_of(std::string_view(bytes, sizeof guid.guidPrefix.value)).low;
 }
 
+Guid to_guid(const eprosima::fastrtps::rtps::GUID_t& guid) {
+  Guid result;
+  std::ranges::copy(guid.guidPrefix.value, result.begin());
+  std::ranges::copy(guid.entityId.value, result.begin() + sizeof guid.guidPrefix.value);
+  return result;
+}
+
 Result<Participant> Participant::open(const ParticipantOptions& options) { return create(options, nullptr); }
 
 Result<Participant> Participant::open_server(const ParticipantOptions& options, const ServerOptions& server) {
@@ -169,13 +179,16 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
     if (auto ok = secure(qos, identity); !ok) return ok.error();
   }
   DomainParticipant* participant = DomainParticipantFactory::get_instance()->create_participant(
-      static_cast<std::uint32_t>(*domain_result), qos);
+      static_cast<std::uint32_t>(*domain_result), qos, options.watch ? &options.watch->listener() : nullptr,
+      eprosima::fastdds::dds::StatusMask::none());
   if (!participant) {
     return Error{Code::kUnavailable,
                  fmt::format("DDS domain {}: no participant could be created; check the network "
                              "interfaces, /dev/shm and FASTRTPS_DEFAULT_PROFILES_FILE", *domain_result)};
   }
-  return Participant(std::make_shared<Core>(participant, *domain_result));
+  auto core = std::make_shared<Core>(participant, *domain_result);
+  core->watch = options.watch;
+  return Participant(std::move(core));
 }
 
 int Participant::domain() const { return core_->domain; }
@@ -201,7 +214,10 @@ eprosima::fastdds::dds::Topic* Participant::Core::acquire_topic(
     topic = participant->create_topic(name, type.get_type_name(),
                                       eprosima::fastdds::dds::TOPIC_QOS_DEFAULT);
   }
-  if (!topic || topic->get_type_name() != type.get_type_name()) {
+  // The middleware would use the first of two serializers of one name for both.
+  const auto serializer = participant->find_type(type.get_type_name());
+  const bool ours = !serializer.empty() && typeid(*serializer.get()) == typeid(*type.get());
+  if (!topic || topic->get_type_name() != type.get_type_name() || !ours) {
     throw SetupError(fmt::format("topic {}: the middleware refused it with type {}", name,
                                  type.get_type_name()));
   }

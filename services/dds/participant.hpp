@@ -13,6 +13,8 @@
 
 namespace jostle::dds {
 
+class EndpointWatch;
+
 /// The middleware refused an entity: a wrong profile, or no memory. Thrown
 /// while a program sets itself up, never later; `main` reports it.
 struct SetupError : std::runtime_error {
@@ -33,6 +35,7 @@ struct ParticipantOptions {
   /// Else JOSTLE_DDS_TRANSPORT ("udp" or "default"), else kDefault when
   /// FASTRTPS_DEFAULT_PROFILES_FILE is set, else kUdp.
   std::optional<Transport> transport;
+  std::shared_ptr<EndpointWatch> watch;  ///< hears of all others from the first moment; may be empty
 };
 
 /// A discovery server: listens there, introduces participants to each other.

@@ -4,6 +4,10 @@
 
 namespace jostle::dds {
 
+/// As the depth of a reader: every sample, one that waits for a lost predecessor to be sent
+/// again included. For recorders.
+inline constexpr int kKeepAll = 0;
+
 /// A reader may not ask for more than the writer offers; both sides of a topic
 /// take theirs from `topics.hpp`, so they agree.
 struct Qos {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "services/support/files.hpp"
 
@@ -140,19 +141,29 @@ void Session::listen() {
   if (!world_.take_all().empty()) world_heard_ = Clock::now();
 }
 
-// The goal goes out once everybody who has a part in it was heard.
+// Who takes goals and gives feedback. Whoever does only one of them looks on.
+std::vector<std::uint64_t> Session::coordinators() const {
+  std::vector<std::uint64_t> both;
+  std::ranges::set_intersection(goal_.matched_participants(), feedback_.matched_participants(), std::back_inserter(both));
+  return both;
+}
+
+// The goal goes out once everybody who has a part in it was heard and hears us.
 Result<void> Session::send_goal() {
-  if (others_heard_ || goal_.matched() > 1) {
+  const std::vector<std::uint64_t> found = coordinators();
+  if (others_heard_ || found.size() > 1) {
     return Error{Code::kUnavailable,
                  fmt::format("domain {}: got another coordinator beside ours, wanted none; another run uses "
                              "this domain, set ROS_DOMAIN_ID to a free one", participant_.domain())};
   }
-  if (!coordinator_heard_ || !world_heard_ || goal_.matched() == 0 || results_.matched() == 0) {
+  const bool answers = found.size() == 1 && feedback_.last_writer() == found.front() &&
+                       std::ranges::binary_search(results_.matched_participants(), found.front());
+  if (!answers || !world_heard_) {
     if (Clock::now() < goal_deadline_) return {};
     return Error{Code::kUnavailable,
                  fmt::format("{} not heard within {} s of its start on domain {}; `jostle doctor` checks "
                              "shared memory and multicast",
-                             coordinator_heard_ ? "the simulated world was" : "the coordinator was",
+                             answers ? "the simulated world was" : "the coordinator was",
                              kStart.count(), participant_.domain())};
   }
   jostle_msgs::msg::Goal goal;

@@ -58,6 +58,7 @@ class Session {
   Result<void> check_alive(const std::string& name, ChildProcess& child) const;
   Result<void> check_heard(const std::string& name, Clock::time_point heard) const;
   void listen();
+  std::vector<std::uint64_t> coordinators() const;  // their participants, ascending
   Result<void> send_goal();
 
   const RunOptions& options_;

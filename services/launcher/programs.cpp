@@ -12,7 +12,7 @@ namespace jostle::services {
 namespace {
 
 // Sorted by name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kPurposes{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 13> kPurposes{{
     {"bench", "measure physics, pools and planners on this machine"},
     {"coordinator", "plan and re-plan with a pool of workers"},
     {"discovery-server", "introduce machines to each other where there is no multicast"},
@@ -20,6 +20,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kPurpose
     {"experiment", "run a study of the thesis and write its figure or table"},
     {"keys", "make, hand out and revoke identities for protected DDS"},
     {"render", "draw states of a scene as a picture"},
+    {"replay", "make the decisions of a recorded run again, and compare"},
     {"run", "start everything for a scene on this machine"},
     {"scene", "make, check, disturb and show scene files"},
     {"sim", "simulate the world in which actions happen"},

@@ -109,7 +109,7 @@ Result<RecordedMotion> RecordedMotion::read(bag::BagReader& reader, const Record
   for (Moment& moment : *moments_result) {
     const double time = clock == RunClock::kWorld ? moment.world - first.world : 1e-9 * static_cast<double>(moment.wall - first.wall);
     if (!samples.empty() && time < samples.back().time) continue;  // of a world before
-    Sample sample{.time = time, .state = std::move(moment.state)};
+    Sample sample{.time = time, .state = {.q = std::move(moment.state.q)}};
     count_decisions(run, moment.world, sample);
     if (!samples.empty() && time == samples.back().time) samples.back() = std::move(sample);
     else samples.push_back(std::move(sample));

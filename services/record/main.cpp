@@ -181,6 +181,7 @@ int main(int argc, char** argv) {
                   {"options", fmt::format("{}", fmt::join(words, " "))}};
   const StopSignal signal;
   std::signal(SIGUSR1, on_trigger);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   try {
     return record(std::move(options), arguments.json, signal.token());
   } catch (const std::exception& error) {  // no memory

@@ -12,7 +12,8 @@ namespace jostle::services {
 namespace {
 
 // Sorted by name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 13> kPurposes{{
+constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string_view>>({
+    {"bag", "look into recordings, check, save and export them"},
     {"bench", "measure physics, pools and planners on this machine"},
     {"coordinator", "plan and re-plan with a pool of workers"},
     {"discovery-server", "introduce machines to each other where there is no multicast"},
@@ -26,7 +27,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 13> kPurpose
     {"sim", "simulate the world in which actions happen"},
     {"train-coarse", "train the learned coarse model of pushing"},
     {"worker", "simulate rollouts for whoever asks"},
-}};
+});
 
 // Levenshtein's distance, one row at a time.
 std::size_t edits(std::string_view a, std::string_view b) {

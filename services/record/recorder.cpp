@@ -8,8 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include "services/bag/definitions.hpp"
 #include "services/dds/names.hpp"
-#include "services/dds/system_topics.hpp"
 #include "services/dds/topics.hpp"
 
 namespace jostle::services {
@@ -20,7 +20,9 @@ constexpr std::chrono::milliseconds kFlush{400};     // and a tick: half a secon
 constexpr std::chrono::milliseconds kAfterResult{300};  // the last words around a result
 constexpr std::uint64_t kLookAtDisk = 16 << 20;      // bytes written before the next look at the disk
 
-const dds::RawTopic kTrigger{"rt/record/trigger", "std_msgs::msg::dds_::Empty_", {.reliable = false, .depth = dds::kKeepAll}};
+// Reliable, as `ros2 topic pub` is: a best-effort reader misses what comes before it has found
+// the writer, even if the writer has found it.
+const dds::RawTopic kTrigger{"rt/record/trigger", "std_msgs::msg::dds_::Empty_", {.depth = dds::kKeepAll}};
 
 bag::Time wall_clock() {
   const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
@@ -39,13 +41,6 @@ Result<std::uint64_t> free_disk(std::filesystem::path place) {
     return Error{Code::kIo, fmt::format("{}: free disk space is unknown: {}", place.string(), std::strerror(errno))};
   }
   return static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize;
-}
-
-// TODO(#6): the text of the definition, which the room of bags will know.
-std::optional<std::string> definition_of(const std::string& type) {
-  const auto& topics = dds::system_topics();
-  const bool known = std::ranges::any_of(topics, [&](const auto& topic) { return dds::ros_type(topic.type) == type; });
-  return known ? std::optional<std::string>("") : std::nullopt;
 }
 
 double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
@@ -67,9 +62,14 @@ class Recorder::OpenBag {
       if (!index_result) return index_result.error();
       topic.index = *index_result;
     }
-    return writer_->write(topic.index, {.log_time = log_time, .publish_time = sample.publish_time, .sequence = ++topic.messages,
-                                        .data = sample.data});
+    const auto begin = Clock::now();
+    auto written = writer_->write(topic.index, {.log_time = log_time, .publish_time = sample.publish_time, .sequence = ++topic.messages,
+                                               .data = sample.data});
+    worst_write_ = std::max(worst_write_, Clock::now() - begin);
+    return written;
   }
+
+  Clock::duration worst_write() const { return worst_write_; }
 
   bag::BagWriter& writer() { return *writer_; }
 
@@ -82,6 +82,7 @@ class Recorder::OpenBag {
   std::unique_ptr<bag::BagWriter> writer_;
   const Subscriptions& subscriptions_;
   std::vector<Place> places_;  // by topic
+  Clock::duration worst_write_{0};
 };
 
 Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher watcher) {
@@ -103,7 +104,7 @@ Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher
   auto subscriptions_result = Subscriptions::open(
       {.domain = own.domain,
        .selection = own.selection,
-       .definition = [](const std::string& type) { return definition_of(type); },
+       .definition = [](const std::string& type) { return bag::definition_of(type); },
        .on_sample = [self = recorder.get()](int topic, std::span<const std::byte> data,
                                             const dds::Origin& origin) { self->on_sample(topic, data, origin); },
        .on_warning = recorder->watcher_.on_warning});
@@ -295,6 +296,7 @@ bag::Note Recorder::lost_note() const {
 RecordStatus Recorder::status() const {
   RecordStatus status{.seconds = std::chrono::duration<double>(Clock::now() - started_).count()};
   status.messages = bag_ ? messages_ : ring_.size();
+  if (bag_) status.worst_write = std::chrono::duration<double>(bag_->worst_write()).count();
   status.bytes = bag_ ? bag_->writer().bytes() : ring_bytes_;
   for (int topic = 0; topic < topics(); ++topic) status.lost += lost(topic);
   status.topics = static_cast<int>(std::ranges::count_if(written_, [](std::uint64_t count) { return count > 0; }));

@@ -48,6 +48,7 @@ struct RecordStatus {
   std::uint64_t lost = 0;
   std::uint64_t free_disk = 0;  ///< bytes
   int topics = 0;               ///< with messages
+  double worst_write = 0.0;     ///< s, longest single write to the bag; without a ring
 };
 
 struct RecordReport {

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <deque>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <thread>
 #include <utility>
@@ -94,17 +95,25 @@ void ChildProcess::terminate() {
   }
 }
 
-void ChildProcess::end() {
-  terminate();
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  while (pid_ > 0 && !ended()) {
-    if (std::chrono::steady_clock::now() >= deadline) {
-      kill(pid_, SIGKILL);
-      wait();
-      return;
-    }
+std::optional<std::string> ChildProcess::wait_for(std::chrono::milliseconds patience) {
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (pid_ > 0 && !ended() && std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
+  return ended_;
+}
+
+bool ChildProcess::has_said(const std::string& text) const {
+  std::ifstream in(log_);
+  const std::string said{std::istreambuf_iterator<char>(in), {}};
+  return said.find(text) != std::string::npos;
+}
+
+void ChildProcess::end() {
+  terminate();
+  if (pid_ < 0 || wait_for(kPatience)) return;
+  kill(pid_, SIGKILL);
+  wait();
 }
 
 std::string ChildProcess::last_words() const {

@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -35,6 +36,12 @@ class ChildProcess {
 
   /// Waits until it has ended, and says how.
   std::string wait();
+
+  /// The same, for so long at most.
+  std::optional<std::string> wait_for(std::chrono::milliseconds patience);
+
+  /// Whether it has printed that so far.
+  bool has_said(const std::string& text) const;
 
   /// Asks it to end, without waiting.
   void terminate();

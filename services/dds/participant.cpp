@@ -5,8 +5,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -16,6 +16,7 @@
 #include <fastrtps/utils/IPLocator.h>
 
 #include "idl/types/hash.hpp"
+#include "idl/types/number.hpp"
 #include "services/dds/core.hpp"
 #include "services/dds/profiles.hpp"
 #include "services/dds/security.hpp"
@@ -36,26 +37,6 @@ constexpr std::uint32_t kPeersPerHost = 64;
 // Bytes; several samples of 1 MiB, whose p99 was 5 ms, and 39 ms with the middleware's 512 KiB.
 constexpr std::uint32_t kSegment = 8 << 20;
 constexpr int kLargestDomain = 232;  // RTPS 2.2, 9.6.1.1: ports would pass 65535 beyond
-
-Result<int> choose_domain(const std::optional<int>& wanted) {
-  int domain = wanted.value_or(0);
-  std::string origin = "--domain";
-  if (const char* text = std::getenv("ROS_DOMAIN_ID"); !wanted && text && *text) {
-    origin = "ROS_DOMAIN_ID";
-    const std::string_view digits(text);
-    const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), domain);
-    if (end.ec != std::errc{} || end.ptr != digits.data() + digits.size()) domain = -1;
-    if (domain < 0) {
-      return Error{Code::kInvalidArgument,
-                   fmt::format("{}: got '{}', wanted 0 to {}", origin, text, kLargestDomain)};
-    }
-  }
-  if (domain < 0 || domain > kLargestDomain) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}: got {}, wanted 0 to {}", origin, domain, kLargestDomain)};
-  }
-  return domain;
-}
 
 std::string environment(const char* variable) {
   const char* text = std::getenv(variable);
@@ -141,6 +122,15 @@ void serve(const ServerOptions& server, DomainParticipantQos& qos) {
 
 }  // namespace
 
+Result<int> choose_domain(std::optional<int> wanted) {
+  const std::string text = wanted ? std::to_string(*wanted) : environment("ROS_DOMAIN_ID");
+  if (text.empty()) return 0;
+  if (const auto domain = parse_whole(text, 0, kLargestDomain)) return *domain;
+  return Error{Code::kInvalidArgument, fmt::format("{}: got '{}', wanted 0 to {}", wanted ? "--domain" : "ROS_DOMAIN_ID", text, kLargestDomain)};
+}
+
+std::vector<std::string> Participant::others() const { return core_->participant->get_participant_names(); }
+
 std::optional<DomainParticipantQos> built_in_participant(const std::string& profile) {
   if (profile != "udp" && profile != "shared_memory") return {};
   DomainParticipantQos qos;
@@ -160,6 +150,17 @@ std::optional<DomainParticipantQos> built_in_participant(const std::string& prof
   udp->maxInitialPeersRange = kPeersPerHost;
   transport.user_transports.push_back(udp);
   return qos;
+}
+
+std::uint32_t socket_buffer() {
+  DomainParticipantQos qos = *built_in_participant("udp");
+  DomainParticipantFactory::get_instance()->get_participant_qos_from_profile("udp", qos);
+  std::uint32_t largest = 0;
+  for (const auto& transport : qos.transport().user_transports) {
+    const auto socket = std::dynamic_pointer_cast<eprosima::fastdds::rtps::SocketTransportDescriptor>(transport);
+    if (socket) largest = std::max(largest, socket->receiveBufferSize);
+  }
+  return largest;
 }
 
 std::uint64_t participant_id(const eprosima::fastrtps::rtps::GUID_t& guid) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "idl/types/result.hpp"
 #include "services/dds/discovery.hpp"
@@ -18,6 +19,9 @@ namespace jostle::dds {
 struct SetupError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+/// `wanted`, else ROS_DOMAIN_ID, else 0. Error kInvalidArgument: says where it came from, got, wanted.
+Result<int> choose_domain(std::optional<int> wanted);
 
 struct ParticipantOptions {
   std::string name = "jostle";  ///< as tools list it
@@ -66,6 +70,9 @@ class Participant {
   /// Names this participant in messages: the same number that
   /// WriterBase::matched_participants() gives elsewhere.
   std::uint64_t id() const;
+
+  /// Names of the participants found so far, as ParticipantOptions::name has them; ours is among them.
+  std::vector<std::string> others() const;
 
   class Core;
   Core& core() const { return *core_; }

@@ -2,6 +2,7 @@
 /// \file
 /// The file of transports and QoS: what it says is in force instead of what the code says.
 
+#include <cstdint>
 #include <filesystem>
 
 #include "idl/types/result.hpp"
@@ -27,5 +28,8 @@ ProfilesFile profiles_file();
 ///          kInvalidArgument  says the line, what is there and what was wanted: what Fast DDS does not take,
 ///                            names that nothing asks for, promises that writers and readers cannot keep
 Result<void> load_profiles(const ProfilesFile& file);
+
+/// Bytes that sockets of the profile udp ask the kernel for, with the profiles loaded.
+std::uint32_t socket_buffer();
 
 }  // namespace jostle::dds

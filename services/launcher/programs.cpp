@@ -12,7 +12,7 @@ namespace jostle::services {
 namespace {
 
 // Sorted by name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 13> kPurposes{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kPurposes{{
     {"bag", "look into recordings, check, save and export them"},
     {"bench", "measure physics, pools and planners on this machine"},
     {"coordinator", "plan and re-plan with a pool of workers"},
@@ -20,6 +20,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 13> kPurpose
     {"doctor", "say what is wrong with this machine, and the remedy"},
     {"experiment", "run a study of the thesis and write its figure or table"},
     {"keys", "make, hand out and revoke identities for protected DDS"},
+    {"record", "write topics into a bag"},
     {"render", "draw states of a scene as a picture"},
     {"run", "start everything for a scene on this machine"},
     {"scene", "make, check, disturb and show scene files"},

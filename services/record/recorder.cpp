@@ -321,6 +321,12 @@ void Recorder::look_at_disk() {
 
 RecordReport Recorder::finish(std::string reason, std::optional<Error> failure) {
   trigger_reader_.reset();
+  for (const auto& [topic, refusals] : subscriptions_->unmatched()) {
+    if (watcher_.on_warning) {
+      watcher_.on_warning(fmt::format("{}: it has a writer and none of its messages came; got {} refusals by the middleware, wanted "
+                                      "an offer that a plain reader takes (shared ownership, no partition)", topic, refusals));
+    }
+  }
   subscriptions_->close();
   // What came before the end belongs to it; after a failed write it is counted as lost.
   auto rest = queue_.take(Clock::now(), {});

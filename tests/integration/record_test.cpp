@@ -1,6 +1,7 @@
 // jostle record as a user starts it, beside publishers of this test: nothing is lost, and what
 // is lost is counted.
 
+#include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <gmock/gmock.h>
 #include <sched.h>
 #include <sys/mount.h>
@@ -10,6 +11,7 @@
 #include <set>
 
 #include "services/bag/folder_reader.hpp"
+#include "services/dds/core.hpp"
 #include "services/dds/names.hpp"
 #include "services/dds/raw.hpp"
 #include "services/dds/topics.hpp"
@@ -198,6 +200,26 @@ TEST_F(Record, NamesTypesItDoesNotKnowAndLeavesThemOut) {
   ASSERT_TRUE(known.was_received());
   ASSERT_EQ(stop_recorder(), 0);
   EXPECT_THAT(topics_of(bag()), ElementsAre("/y"));
+}
+
+TEST_F(Record, NamesTopicsWhoseWriterOffersWhatNobodyTakes) {
+  record({"/x", "/y"});
+  const auto participant = dds::Participant::open({.domain = domain}).value();
+  const std::string type = *dds::wire_type("sensor_msgs/msg/JointState");
+  const dds::RawWriter registers(participant, {"rt/z", type, kDeep});
+  auto& core = participant.core();
+  auto* topic = core.participant->create_topic("rt/x", type, eprosima::fastdds::dds::TOPIC_QOS_DEFAULT);
+  ASSERT_TRUE(topic);
+  eprosima::fastdds::dds::DataWriterQos exclusive;
+  exclusive.ownership().kind = eprosima::fastdds::dds::EXCLUSIVE_OWNERSHIP_QOS;
+  ASSERT_TRUE(core.publisher->create_datawriter(topic, exclusive));
+  const dds::RawWriter plain_one(participant, {"rt/y", type, kDeep});  // announced after it
+  ASSERT_TRUE(plain_one.wait_for_readers(in(kPatience)));
+
+  ASSERT_EQ(stop_recorder(), 0);
+
+  EXPECT_THAT(recorder->err(), HasSubstr("/x: it has a writer and none of its messages came"));
+  EXPECT_THAT(recorder->err(), Not(HasSubstr("/y: it has a writer")));
 }
 
 TEST_F(Record, RingIsWrittenWhenASignalOrAMessageSaysSo) {

@@ -58,4 +58,10 @@ class ChildProcess {
   std::optional<std::string> ended_;
 };
 
+/// Runs a program of the system to its end; it writes to `log`.
+/// Errors   kNotFound  it is not on PATH; names the Debian package that has it
+///          kIo        it failed; how, and its last words
+Result<void> run_tool(const std::string& name, const std::string& package, const std::vector<std::string>& arguments,
+                      const std::filesystem::path& log);
+
 }  // namespace jostle::services

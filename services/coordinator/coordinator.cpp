@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "physics_pool/local/simulator.hpp"
 #include "services/world_link/messages.hpp"
 #include "services/world_link/world_client.hpp"
 
@@ -28,14 +27,6 @@ const char* word(planners::Phase phase) {
     case planners::Phase::kDone: return "done";
   }
   return "";
-}
-
-Result<planners::ControlOptions::Method> parse_controller(const std::string& name, const physics_pool::SceneTask& task) {
-  if (task.is_push() && name == "mpc") return planners::ControlOptions::Method::kOnline;  // asked of nobody
-  if (!task.is_push() && name == "or") return planners::ControlOptions::Method::kOnline;
-  if (!task.is_push() && name == "nr") return planners::ControlOptions::Method::kNaive;
-  return Error{Code::kInvalidArgument, fmt::format("controller: got '{}' for a task to {}, wanted {}", name,
-                                                   task.kind, task.is_push() ? "mpc" : "or, nr")};
 }
 
 using Rollouts = std::map<std::string, std::uint64_t>;  // by worker
@@ -88,6 +79,9 @@ Coordinator::Coordinator(const dds::Participant& participant, physics_pool::Asyn
       pool_(pool),
       feedback_writer_(participant, topics::kTaskFeedback),
       result_writer_(participant, topics::kTaskResult),
+      run_writer_(participant, topics::kTaskRun),
+      observation_writer_(participant, topics::kTaskObservation),
+      plan_writer_(participant, topics::kTaskPlan),
       goals_(participant, topics::kTaskGoal, kGoalQueue),
       cancels_(participant, topics::kTaskCancel, [this](const jostle_msgs::msg::Cancel& cancel) {
         const std::lock_guard lock(mutex_);
@@ -128,13 +122,13 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   const Rollouts before = rollouts_of(pool_.status());
   {
     const std::jthread refuser([this](std::stop_token own) { refuse_goals_meanwhile(own); });
-    auto task_result = prepare(goal);
+    auto task_result = Task::prepare(goal, pool_, [](const std::string& why) { spdlog::info("split: {}", why); });
     auto outcome_result = task_result ? perform(goal, *task_result, cancelled)
                                       : Result<planners::Outcome>(task_result.error());
     if (outcome_result) {
       result.success(outcome_result->success);
       result.reason(outcome_result->reason);
-      result.report(report_of(*outcome_result, physics_pool::scene_hash(task_result->execution), goal.seed(),
+      result.report(report_of(*outcome_result, physics_pool::scene_hash(task_result->execution_scene()), goal.seed(),
                               since(before, rollouts_of(pool_.status()))));
     } else {
       const Error& error = outcome_result.error();
@@ -150,55 +144,18 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   feedback_.phase("idle");
 }
 
-Result<Coordinator::Task> Coordinator::prepare(const Goal& goal) {
-  auto execution_result = physics_pool::parse_scene(goal.execution_scene(), "goal.execution_scene");
-  if (!execution_result) return execution_result.error();
-  auto planning_result = physics_pool::parse_scene(goal.planning_scene(), "goal.planning_scene");
-  if (!planning_result) return planning_result.error();
-  auto parameters_result = parse_parameters(goal.parameters(), "goal.parameters");
-  if (!parameters_result) return parameters_result.error();
-  auto method_result = parse_controller(goal.controller(), planning_result->task);
-  if (!method_result) return method_result.error();
-  auto predictor_result = Predictor::make(goal.predictor().empty() ? "fine" : goal.predictor(), pool_,
-                                          [](const std::string& why) { spdlog::info("split: {}", why); });
-  if (!predictor_result) return predictor_result.error();
-  auto world_result = predictor_result->pool().load(*planning_result);
-  if (!world_result) return world_result.error();
-  Task task{.execution = std::move(execution_result).value(),
-            .planning = std::move(planning_result).value(),
-            .parameters = std::move(parameters_result).value(),
-            .predictor = std::move(predictor_result).value(),
-            .world = *world_result};
-  task.parameters.control.method = *method_result;
-  task.parameters.control.plan_only = task.parameters.mpc.plan_only = goal.plan_only();
-  return task;
-}
-
 Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task, std::stop_token stop) {
-  auto believed_result = physics_pool::World::compile(task.planning);
-  if (!believed_result) return believed_result.error();
-  const physics_pool::WorldPtr believed = *believed_result;
-  const physics_pool::TaskGeometry& geometry = believed->geometry();
-
+  const physics_pool::TaskGeometry& geometry = task.geometry();
   RobotClient robot(participant_);
   ObjectsClient objects(participant_, robot);
-  planners::Pbsto planner(task.predictor.pool(), task.parameters.planner,
-                          [&](const planners::Progress& progress) { note(progress, geometry); });
-  planners::ControlSetup setup{.planner = planner,
-                               .robot = robot,
-                               .objects = objects,
-                               .geometry = geometry,
-                               .objective = task.parameters.planner.objective,
-                               .world = task.world,
-                               .seed = goal.seed()};
-  // Believed shapes at exact poses need no moving apart, and must not get it:
-  // the plan for a perfectly known world starts from that very world.
-  if (task.world != physics_pool::scene_hash(task.execution)) {
-    setup.make_feasible = [&believed](const State& x) { return physics_pool::separate(*believed, x); };
-  }
-  const auto on_event = [&](const planners::ControlEvent& event) { note(event, geometry); };
-  if (geometry.task.is_push()) return planners::run_mpc(setup, task.parameters.mpc, on_event, std::move(stop));
-  return planners::run_controller(setup, task.parameters.control, on_event, std::move(stop));
+  run_writer_.write(describe_run(goal));
+  const Task::Watch watch{
+      .on_event = [&](const planners::ControlEvent& event) { note(event, geometry); },
+      .on_progress = [&](const planners::Progress& progress) { note(progress, geometry); },
+      .journal = {.on_observation = [this](const jostle_msgs::msg::Observation& seen) { observation_writer_.write(seen); },
+                  .on_plan = [this](const jostle_msgs::msg::Plan& plan) { plan_writer_.write(plan); }},
+      .time = [&] { return robot.time(); }};
+  return task.perform(robot, objects, watch, std::move(stop));
 }
 
 void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {

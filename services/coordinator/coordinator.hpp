@@ -10,13 +10,11 @@
 #include <string>
 
 #include "physics_pool/api/pool.hpp"
-#include "planners/control/controller.hpp"
-#include "services/config/parameters.hpp"
-#include "services/config/predictor.hpp"
 #include "services/dds/participant.hpp"
 #include "services/dds/reader.hpp"
 #include "services/dds/topics.hpp"
 #include "services/dds/writer.hpp"
+#include "services/task/task.hpp"
 
 namespace jostle::services {
 
@@ -24,7 +22,8 @@ namespace jostle::services {
 /// cancelled one ends within a fraction of a second, the robot standing still.
 ///
 /// Feedback goes out several times a second whether there is news or not, so
-/// that silence means death.
+/// that silence means death. What decides a task and what it decides goes out as
+/// TaskRun, Observation and Plan: enough to make every decision again.
 class Coordinator {
  public:
   Coordinator(const dds::Participant& participant, physics_pool::AsyncPool& pool);
@@ -35,15 +34,6 @@ class Coordinator {
  private:
   using Goal = jostle_msgs::msg::Goal;
 
-  /// Everything a goal's texts say, checked.
-  struct Task {
-    physics_pool::Scene execution, planning;
-    Parameters parameters;
-    Predictor predictor;            ///< what stands between the workers and the planner
-    Hash world;                     ///< planning world, known to the predictor
-  };
-
-  Result<Task> prepare(const Goal& goal);
   Result<planners::Outcome> perform(const Goal& goal, Task& task, std::stop_token stop);
   void serve(const Goal& goal, std::stop_token stop);
   void refuse_goals_meanwhile(std::stop_token stop);
@@ -63,6 +53,9 @@ class Coordinator {
 
   dds::Writer<jostle_msgs::msg::Feedback> feedback_writer_;
   dds::Writer<jostle_msgs::msg::GoalResult> result_writer_;
+  dds::Writer<jostle_msgs::msg::TaskRun> run_writer_;
+  dds::Writer<jostle_msgs::msg::Observation> observation_writer_;
+  dds::Writer<jostle_msgs::msg::Plan> plan_writer_;
   dds::Inbox<Goal> goals_;
   dds::Reader<jostle_msgs::msg::Cancel> cancels_;
 };

@@ -7,22 +7,37 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 
 #include "services/dds/core.hpp"
+#include "services/dds/profiles.hpp"
 
 namespace jostle::dds {
 namespace {
 
 using namespace eprosima::fastdds::dds;
 
-DataReaderQos reader_qos(const Participant::Core& core, const Qos& qos) {
+DataReaderQos reader_qos(const Participant::Core& core, const std::string& topic, const Qos& qos) {
   DataReaderQos result = core.subscriber->get_default_datareader_qos();
   apply(qos, result);
+  if (qos.kind.empty()) return result;
+  // In force instead, if the file has it: the topic's profile, else its kind's.
+  const auto take = [&](const std::string& name) {
+    return core.subscriber->get_datareader_qos_from_profile(name, result) == ReturnCode_t::RETCODE_OK;
+  };
+  take(topic) || take(std::string(qos.kind));
   return result;
+}
+
+Origin origin_of(const SampleInfo& info) {
+  const auto& identity = info.sample_identity;
+  return {.participant = participant_id(identity.writer_guid()),
+          .writer = to_guid(identity.writer_guid()),
+          .sequence = identity.sequence_number().to64long(),
+          .source_time = info.source_timestamp.to_ns()};
 }
 
 }  // namespace
 
 struct ReaderBase::Impl : DataReaderListener {
-  Impl(Participant owner, TypeSupport type_support, std::function<void(const void*)> callback)
+  Impl(Participant owner, TypeSupport type_support, std::function<void(const void*, const Origin&)> callback)
       : participant(std::move(owner)), type(std::move(type_support)), on_sample(std::move(callback)) {}
 
   void on_data_available(DataReader* source) override {
@@ -31,15 +46,19 @@ struct ReaderBase::Impl : DataReaderListener {
     SampleInfo info;
     // The mutex is not held while taking: the middleware has locks of its own.
     while (source->take_next_sample(sample.get(), &info) == ReturnCode_t::RETCODE_OK) {
-      if (info.valid_data) call(sample.get());
+      if (info.valid_data) call(sample.get(), origin_of(info));
     }
   }
 
-  void call(const void* sample) {
+  void on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) override {
+    writers.update(iHandle2GUID(status.last_publication_handle), status.current_count_change);
+  }
+
+  void call(const void* sample, const Origin& origin) {
     const std::lock_guard lock(mutex);
     if (closed) return;
     try {
-      on_sample(sample);
+      on_sample(sample, origin);
     } catch (const std::exception& error) {
       fmt::print(stderr, "{}: a sample was dropped: {}\n", topic->get_name(), error.what());
     }
@@ -47,24 +66,25 @@ struct ReaderBase::Impl : DataReaderListener {
 
   Participant participant;
   TypeSupport type;
-  std::function<void(const void*)> on_sample;
+  std::function<void(const void*, const Origin&)> on_sample;
   eprosima::fastdds::dds::Topic* topic = nullptr;
   DataReader* reader = nullptr;
+  Peers writers;
 
   std::mutex mutex;  // guards closed; held during a callback, so one runs at a time
   bool closed = false;
 };
 
 ReaderBase::ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos,
-                       TypeSupport type, std::function<void(const void*)> on_sample)
+                       TypeSupport type, std::function<void(const void*, const Origin&)> on_sample)
     : impl_(std::make_unique<Impl>(participant, type, std::move(on_sample))) {
   Participant::Core& core = participant.core();
   impl_->topic = core.acquire_topic(topic, type);
-  impl_->reader = core.subscriber->create_datareader(impl_->topic, reader_qos(core, qos), impl_.get(),
-                                                     StatusMask::data_available());
+  impl_->reader = core.subscriber->create_datareader(impl_->topic, reader_qos(core, topic, qos), impl_.get(),
+                                                     StatusMask::data_available() << StatusMask::subscription_matched());
   if (impl_->reader) return;
   core.release_topic(impl_->topic);
-  throw SetupError("topic " + topic + ": the middleware refused a reader");
+  throw SetupError("topic " + topic + ": the middleware refused a reader; profiles: " + profiles_file().path.string());
 }
 
 ReaderBase::~ReaderBase() {
@@ -78,10 +98,20 @@ ReaderBase::~ReaderBase() {
   core.release_topic(impl_->topic);
 }
 
-int ReaderBase::matched() const {
-  SubscriptionMatchedStatus status;
-  impl_->reader->get_subscription_matched_status(status);
-  return status.current_count;
+int ReaderBase::matched() const { return impl_->writers.count(); }
+
+ReaderTroubles ReaderBase::troubles() const {
+  SampleLostStatus lost;
+  SampleRejectedStatus rejected;
+  RequestedIncompatibleQosStatus incompatible;
+  impl_->reader->get_sample_lost_status(lost);
+  impl_->reader->get_sample_rejected_status(rejected);
+  impl_->reader->get_requested_incompatible_qos_status(incompatible);
+  return {.lost = static_cast<std::uint64_t>(lost.total_count),
+          .rejected = static_cast<std::uint64_t>(rejected.total_count),
+          .incompatible = static_cast<std::uint64_t>(incompatible.total_count)};
 }
+
+std::vector<std::uint64_t> ReaderBase::matched_participants() const { return impl_->writers.participants(); }
 
 }  // namespace jostle::dds

@@ -12,11 +12,27 @@
 #include <stop_token>
 #include <vector>
 
+#include "services/dds/guid.hpp"
 #include "services/dds/participant.hpp"
 #include "services/dds/topic.hpp"
 #include "services/dds/writer.hpp"
 
 namespace jostle::dds {
+
+/// Where a sample comes from.
+struct Origin {
+  std::uint64_t participant = 0;  ///< Participant::id() of who wrote it
+  Guid writer{};
+  std::uint64_t sequence = 0;     ///< of the writer, counting from 1: a gap is a lost sample
+  std::int64_t source_time = 0;   ///< when it was written, ns since the Unix epoch, on the writer's clock
+};
+
+/// What did not reach a reader, so far.
+struct ReaderTroubles {
+  std::uint64_t lost = 0;          ///< samples that the middleware gave up
+  std::uint64_t rejected = 0;      ///< had no room when they came; a reliable writer sends them again
+  std::uint64_t incompatible = 0;  ///< writers that offer less than is asked for
+};
 
 /// Everything about a reader that does not depend on its type.
 class ReaderBase {
@@ -24,7 +40,7 @@ class ReaderBase {
   /// `on_sample` gets a sample of the topic's type. Throws SetupError.
   ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos,
              eprosima::fastdds::dds::TypeSupport type,
-             std::function<void(const void* sample)> on_sample);
+             std::function<void(const void* sample, const Origin& origin)> on_sample);
   /// Waits for a running callback; none runs afterwards.
   ~ReaderBase();
   ReaderBase(const ReaderBase&) = delete;
@@ -32,6 +48,11 @@ class ReaderBase {
 
   /// Writers found so far, and gone ones not counted.
   int matched() const;
+
+  /// Participant::id() of every one that has a writer for us; each once, ascending.
+  std::vector<std::uint64_t> matched_participants() const;
+
+  ReaderTroubles troubles() const;
 
  private:
   struct Impl;
@@ -47,12 +68,18 @@ template <class T>
 class Reader : public ReaderBase {
  public:
   using OnSample = std::function<void(const T&)>;
+  using OnSampleOf = std::function<void(const T&, const Origin&)>;
 
   Reader(const Participant& participant, const Topic<T>& topic, OnSample on_sample)
+      : Reader(participant, topic, OnSampleOf([on_sample = std::move(on_sample)](const T& sample, const Origin&) {
+                 on_sample(sample);
+               })) {}
+
+  Reader(const Participant& participant, const Topic<T>& topic, OnSampleOf on_sample)
       : ReaderBase(participant, topic.name, topic.qos,
                    eprosima::fastdds::dds::TypeSupport(new Serializer<T>()),
-                   [on_sample = std::move(on_sample)](const void* sample) {
-                     on_sample(*static_cast<const T*>(sample));
+                   [on_sample = std::move(on_sample)](const void* sample, const Origin& origin) {
+                     on_sample(*static_cast<const T*>(sample), origin);
                    }) {}
 };
 
@@ -65,7 +92,9 @@ class Inbox {
  public:
   Inbox(const Participant& participant, const Topic<T>& topic, std::size_t capacity)
       : capacity_(capacity),
-        reader_(participant, topic, [this](const T& sample) { put(sample); }) {}
+        reader_(participant, topic, typename Reader<T>::OnSampleOf([this](const T& sample, const Origin& origin) {
+                  put(sample, origin.participant);
+                })) {}
 
   /// The oldest sample; waits for one until the deadline or a stop request.
   std::optional<T> take(TimePoint deadline, std::stop_token stop = {}) {
@@ -74,6 +103,13 @@ class Inbox {
     T sample = std::move(samples_.front());
     samples_.pop_front();
     return sample;
+  }
+
+  /// Participant::id() of who wrote the newest sample that arrived, taken or not; nothing
+  /// before the first.
+  std::optional<std::uint64_t> last_writer() const {
+    const std::lock_guard lock(mutex_);
+    return last_writer_;
   }
 
   /// Everything that is there, oldest first, without waiting.
@@ -88,9 +124,10 @@ class Inbox {
   }
 
   int matched() const { return reader_.matched(); }
+  std::vector<std::uint64_t> matched_participants() const { return reader_.matched_participants(); }
 
  private:
-  void put(const T& sample) {
+  void put(const T& sample, std::uint64_t writer) {
     {
       const std::lock_guard lock(mutex_);
       if (samples_.size() == capacity_) {
@@ -98,15 +135,17 @@ class Inbox {
         ++dropped_;
       }
       samples_.push_back(sample);
+      last_writer_ = writer;
     }
     arrived_.notify_one();
   }
 
   const std::size_t capacity_;
-  mutable std::mutex mutex_;  // guards samples_ and dropped_
+  mutable std::mutex mutex_;  // guards samples_, dropped_ and last_writer_
   std::condition_variable_any arrived_;
   std::deque<T> samples_;
   std::uint64_t dropped_ = 0;
+  std::optional<std::uint64_t> last_writer_;
   Reader<T> reader_;  // last: stops before what it fills is gone
 };
 

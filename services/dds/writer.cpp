@@ -1,24 +1,35 @@
 #include "services/dds/writer.hpp"
 
 #include <algorithm>
-#include <condition_variable>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 
 #include "services/dds/core.hpp"
+#include "services/dds/profiles.hpp"
 
 namespace jostle::dds {
-namespace {
 
 using namespace eprosima::fastdds::dds;
 
-DataWriterQos writer_qos(const Participant::Core& core, const Qos& qos) {
-  DataWriterQos result = core.publisher->get_default_datawriter_qos();
-  apply(qos, result);
-  if (qos.retained) result.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
-  result.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
+void apply_to_writer(const Qos& qos, DataWriterQos& writer) {
+  apply(qos, writer);
+  if (qos.retained) writer.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
+  writer.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
   // A lost last packet is noticed by the next heartbeat; the default is 3 s.
-  result.reliable_writer_qos().times.heartbeatPeriod = {0, 100'000'000};
+  writer.reliable_writer_qos().times.heartbeatPeriod = {0, 100'000'000};
+}
+
+namespace {
+
+DataWriterQos writer_qos(const Participant::Core& core, const std::string& topic, const Qos& qos) {
+  DataWriterQos result = core.publisher->get_default_datawriter_qos();
+  apply_to_writer(qos, result);
+  if (qos.kind.empty()) return result;
+  // In force instead, if the file has it: the topic's profile, else its kind's.
+  const auto take = [&](const std::string& name) {
+    return core.publisher->get_datawriter_qos_from_profile(name, result) == ReturnCode_t::RETCODE_OK;
+  };
+  take(topic) || take(std::string(qos.kind));
   return result;
 }
 
@@ -28,23 +39,13 @@ struct WriterBase::Impl : DataWriterListener {
   explicit Impl(Participant owner) : participant(std::move(owner)) {}
 
   void on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) override {
-    const std::lock_guard lock(mutex);
-    const auto reader = iHandle2GUID(status.last_subscription_handle);
-    if (status.current_count_change > 0) {
-      readers.push_back(reader);
-    } else {
-      std::erase(readers, reader);
-    }
-    changed.notify_all();
+    readers.update(iHandle2GUID(status.last_subscription_handle), status.current_count_change);
   }
 
   Participant participant;
   eprosima::fastdds::dds::Topic* topic = nullptr;
   DataWriter* writer = nullptr;
-
-  mutable std::mutex mutex;  // guards readers
-  std::condition_variable changed;
-  std::vector<eprosima::fastrtps::rtps::GUID_t> readers;
+  Peers readers;
 };
 
 WriterBase::WriterBase(const Participant& participant, const std::string& topic, const Qos& qos,
@@ -52,11 +53,11 @@ WriterBase::WriterBase(const Participant& participant, const std::string& topic,
     : impl_(std::make_unique<Impl>(participant)) {
   Participant::Core& core = participant.core();
   impl_->topic = core.acquire_topic(topic, type);
-  impl_->writer = core.publisher->create_datawriter(impl_->topic, writer_qos(core, qos), impl_.get(),
+  impl_->writer = core.publisher->create_datawriter(impl_->topic, writer_qos(core, topic, qos), impl_.get(),
                                                     StatusMask::publication_matched());
   if (impl_->writer) return;
   core.release_topic(impl_->topic);
-  throw SetupError("topic " + topic + ": the middleware refused a writer");
+  throw SetupError("topic " + topic + ": the middleware refused a writer; profiles: " + profiles_file().path.string());
 }
 
 WriterBase::~WriterBase() {
@@ -73,27 +74,22 @@ WriterBase& WriterBase::operator=(WriterBase&& other) noexcept {
   return *this;
 }
 
-int WriterBase::matched() const {
-  const std::lock_guard lock(impl_->mutex);
-  return static_cast<int>(impl_->readers.size());
-}
+int WriterBase::matched() const { return impl_->readers.count(); }
 
 bool WriterBase::wait_for_readers(TimePoint deadline, int count) const {
-  std::unique_lock lock(impl_->mutex);
-  return impl_->changed.wait_until(lock, deadline, [&] {
-    return static_cast<int>(impl_->readers.size()) >= count;
-  });
+  return impl_->readers.wait_for(count, deadline);
 }
 
-std::vector<std::uint64_t> WriterBase::matched_participants() const {
-  std::vector<std::uint64_t> ids;
-  {
-    const std::lock_guard lock(impl_->mutex);
-    for (const auto& reader : impl_->readers) ids.push_back(participant_id(reader));
-  }
-  std::ranges::sort(ids);
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  return ids;
+std::vector<std::uint64_t> WriterBase::matched_participants() const { return impl_->readers.participants(); }
+
+bool WriterBase::reaches(std::uint64_t participant) const {
+  return std::ranges::binary_search(impl_->readers.participants(), participant);
+}
+
+bool WriterBase::wait_until_received(TimePoint deadline) const {
+  const std::chrono::duration<double> time = deadline - std::chrono::steady_clock::now();
+  if (time.count() <= 0) return false;
+  return impl_->writer->wait_for_acknowledgments({static_cast<double>(time.count())}) == ReturnCode_t::RETCODE_OK;
 }
 
 bool WriterBase::write_sample(const void* data) {

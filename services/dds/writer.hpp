@@ -36,6 +36,13 @@ class WriterBase {
   /// Participant::id() of every one that has a reader of ours; each once.
   std::vector<std::uint64_t> matched_participants() const;
 
+  /// Whether that participant has a reader of ours. Others (recorders, `ros2 topic echo`)
+  /// are no sign that whoever is to answer hears us.
+  bool reaches(std::uint64_t participant) const;
+
+  /// Whether every reliable reader found so far had everything by the deadline.
+  bool wait_until_received(TimePoint deadline) const;
+
  protected:
   bool write_sample(const void* data);
 

@@ -78,11 +78,23 @@ Result<robot_bridge::RobotReading> RobotClient::read() {
   }
 }
 
+Result<void> RobotClient::wait_for_robot(std::stop_token stop) {
+  const auto deadline = steady_clock::now() + options_.start;
+  // Statuses come many times a second; each may be of another, newer robot.
+  while (!heard_ || !command_.reaches(*status_.last_writer())) {
+    if (steady_clock::now() >= deadline) {
+      return Error{Code::kUnavailable,
+                   fmt::format("robot: who publishes {} does not read {} ({:.1f} s waited)", topics::kRobotStatus.name,
+                               topics::kRobotCommand.name, static_cast<double>(options_.start.count()) / 1e3)};
+    }
+    if (auto status_result = next_status(stop); !status_result) return status_result.error();
+  }
+  return {};
+}
+
 Result<void> RobotClient::execute(std::span<const double> u, double duration, std::stop_token stop) {
   if (auto ok = robot_bridge::check_command(u, static_cast<int>(u.size()), duration); !ok) return ok;
-  if (!command_.wait_for_readers(steady_clock::now() + options_.start)) {
-    return silent("robot", topics::kRobotCommand.name, options_.start, false);
-  }
+  if (auto ok = wait_for_robot(stop); !ok) return ok;
   jostle_msgs::msg::VelocityCommand command;
   command.header(make_header(time_));
   command.epoch(epoch_);

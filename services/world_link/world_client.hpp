@@ -39,6 +39,9 @@ class RobotClient final : public robot_bridge::Robot {
   /// The next good one.
   Result<jostle_msgs::msg::RobotStatus> next_status(std::stop_token stop);
 
+  /// Until whoever sends the statuses reads our commands. Anybody else may read them too.
+  Result<void> wait_for_robot(std::stop_token stop);
+
   WorldClientOptions options_;
   dds::Inbox<jostle_msgs::msg::RobotStatus> status_;
   dds::Writer<jostle_msgs::msg::VelocityCommand> command_;

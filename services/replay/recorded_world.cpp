@@ -1,0 +1,47 @@
+#include "services/replay/recorded_world.hpp"
+
+#include <condition_variable>
+
+
+namespace jostle::services {
+
+RecordedWorld::RecordedWorld(const RecordedRun& run, double rate)
+    : run_(run), rate_(rate), start_(std::chrono::steady_clock::now()) {}
+
+double RecordedWorld::time() const { return seconds(run_.observations[at_].header()); }
+
+Result<Seen> RecordedWorld::seen() const { return from_message(run_.observations[at_]); }
+
+Result<void> RecordedWorld::advance(std::stop_token stop) {
+  if (at_ + 1 == run_.observations.size()) {
+    over_ = true;
+    return Error{Code::kCancelled, "the recording ends here"};
+  }
+  ++at_;
+  if (rate_ <= 0) return {};
+  const std::chrono::duration<double> since(static_cast<double>(run_.observed[at_] - run_.observed[0]) * 1e-9 / rate_);
+  std::mutex sleeping;
+  std::condition_variable_any asleep;
+  std::unique_lock lock(sleeping);
+  asleep.wait_until(lock, stop, start_ + std::chrono::duration_cast<std::chrono::nanoseconds>(since), [] { return false; });
+  if (stop.stop_requested()) return Error{Code::kCancelled, "stopped on request"};
+  return {};
+}
+
+Result<robot_bridge::RobotReading> RecordedWorld::Robot::read() {
+  auto seen_result = world_.seen();
+  if (!seen_result) return seen_result.error();
+  return std::move(seen_result->robot);
+}
+
+Result<void> RecordedWorld::Robot::execute(std::span<const double>, double, std::stop_token stop) {
+  return world_.advance(std::move(stop));
+}
+
+Result<std::vector<perception::ObjectReading>> RecordedWorld::Objects::read() {
+  auto seen_result = world_.seen();
+  if (!seen_result) return seen_result.error();
+  return std::move(seen_result->objects);
+}
+
+}  // namespace jostle::services

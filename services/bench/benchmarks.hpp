@@ -52,6 +52,9 @@ Result<Measurements> measure_parareal(const Settings& settings);
 /// exchange of slices costs, beyond Eq. 6.4, where there are processors enough.
 Result<Measurements> measure_parareal_scheduling(const Settings& settings);
 
+/// Messages of 1 KiB into a bag of each kind against bare appends of the same bytes, messages/s.
+Result<Measurements> measure_bag(const Settings& settings);
+
 /// The other process of `round-trip`: answers every task until it is told to
 /// end. Returns the exit code.
 int serve_echo(int domain, std::stop_token stop);

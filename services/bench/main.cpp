@@ -25,7 +25,8 @@ struct Benchmark {
   Result<Measurements> (*measure)(const Settings&);
 };
 
-constexpr std::array<Benchmark, 8> kBenchmarks{{
+constexpr std::array<Benchmark, 9> kBenchmarks{{
+    {"bag", "messages into a bag against bare appends of the same bytes", 7, measure_bag},
     {"pool-threads", "ThreadPool against bare loops of engine steps", 15, measure_pool_threads},
     {"pool-dds", "two worker processes against two bare loops", 15, measure_pool_dds},
     {"round-trip", "an empty task through the pool against a bare Fast DDS echo", 25, measure_round_trip},

@@ -1,7 +1,9 @@
 // What BagWriter writes BagReader reads, whatever the files are, and whatever became of them.
 
 #include <gmock/gmock.h>
+#include <sched.h>
 #include <signal.h>
+#include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -407,9 +409,43 @@ TEST_P(BagContract, EndsAtItsLastWholeChunkWhenTheDiskIsFull) {
   }
 }
 
+// A disk that others fill, too: what is kept for the index is not theirs.
+TEST_P(BagContract, IsCompletedOnAFullDisk) {
+  const auto work = [&] {
+    if (unshare(CLONE_NEWNS) != 0 || mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+        mount("tmpfs", folder_.path().c_str(), "tmpfs", 0, "size=4m") != 0) {
+      _exit(77);
+    }
+    const auto sut = writer();
+    const int x = taken(sut->add_topic(string_topic("/x")));
+    Result<void> ok;
+    std::size_t written = 0;
+    while (ok && written < 10'000) {
+      ok = sut->write(x, {.log_time = kBegin + static_cast<Time>(written), .data = noise(1000, written)});
+      ++written;
+    }
+    if (ok) throw std::runtime_error("the disk has no end");
+    std::ofstream(folder_.path() / "another's") << std::string(8 << 20, 'x');
+    if (GetParam().extension == std::string(".db3")) fs::remove(folder_.path() / "another's");  // it keeps no room
+    taken(sut->close());
+    fs::remove(folder_.path() / "another's");
+    const auto back = reader();
+    const auto messages = rest_of(*back);
+    if (messages.size() < 1000 || messages.size() != back->info().messages) throw std::runtime_error("messages are missing");
+  };
+  int status = 0;
+  in_child(work, [&](int ended) {
+    status = ended;
+    return WIFEXITED(ended) && (WEXITSTATUS(ended) == 0 || WEXITSTATUS(ended) == 77);
+  });
+  if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "needs the right to mount";
+}
+
 INSTANTIATE_TEST_SUITE_P(Mcap, BagContract, ::testing::Values(Kind{"Mcap", {}, ".mcap", true}));
 INSTANTIATE_TEST_SUITE_P(McapUncompressed, BagContract,
                          ::testing::Values(Kind{"McapUncompressed", {.compress = false}, ".mcap", true}));
+INSTANTIATE_TEST_SUITE_P(Sqlite, BagContract,
+                         ::testing::Values(Kind{"Sqlite", {.storage = BagOptions::Storage::kSqlite}, ".db3", false}));
 
 }  // namespace
 }  // namespace jostle::tests

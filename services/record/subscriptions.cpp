@@ -1,0 +1,236 @@
+#include "services/record/subscriptions.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <set>
+#include <thread>
+
+#include "services/dds/endpoint_watch.hpp"
+#include "services/dds/names.hpp"
+#include "services/dds/raw.hpp"
+#include "services/dds/system_topics.hpp"
+#include "services/record/sequence_set.hpp"
+
+namespace jostle::services {
+namespace {
+
+using dds::Endpoint;
+
+// What a writer can offer, least first. A reader of a grade hears writers of that and of
+// higher ones, and of the latter less than they offer.
+enum Grade : std::size_t { kBestEffort, kReliable, kLatched, kGrades };
+
+Grade grade_of(bool reliable, bool latched) {
+  if (!reliable) return kBestEffort;
+  return latched ? kLatched : kReliable;
+}
+
+struct TopicState {
+  int index = 0;
+  std::string wire_name, wire_type;
+  bag::Topic topic;
+  bool system = false;
+  std::array<std::unique_ptr<dds::RawReader>, kGrades> readers;  // made and destroyed by one thread at a time
+
+  mutable std::mutex mutex;  // guards seen
+  std::map<dds::Guid, SequenceSet> seen;
+
+  bool has_reader() const {
+    for (const auto& reader : readers) {
+      if (reader) return true;
+    }
+    return false;
+  }
+};
+
+}  // namespace
+
+struct Subscriptions::Impl {
+  explicit Impl(Options given) : options(std::move(given)) {}
+
+  ~Impl() {
+    close();
+    participant.reset();  // its threads call note()
+  }
+
+  void close() {
+    closing.request_stop();
+    if (worker.joinable()) worker.join();
+    for (const auto& state : states) {
+      for (auto& reader : state->readers) reader.reset();
+    }
+  }
+
+  void start() {
+    for (const dds::SystemTopic& topic : dds::system_topics()) {
+      const std::string name = dds::ros_topic(topic.name).value_or("");
+      if (!options.selection.wants(name)) continue;
+      TopicState* state = add(topic.name, topic.type, topic.keyed);
+      if (!state) continue;
+      state->system = true;
+      state->topic.qos = topic.qos;
+      read(*state, grade_of(topic.qos.reliable, topic.qos.latched || topic.qos.retained));
+    }
+    worker = std::jthread([this] { follow(closing.get_token()); });
+  }
+
+  // On the middleware's threads.
+  void note(const Endpoint& endpoint) {
+    const std::lock_guard lock(mutex);
+    if (endpoint.kind == Endpoint::Kind::kWriter) {
+      offers.try_emplace(endpoint.topic, dds::Qos{.reliable = endpoint.reliable, .latched = endpoint.latched});
+    }
+    found.push_back(endpoint);
+    news.notify_one();
+  }
+
+  void follow(std::stop_token stop) {
+    std::unique_lock lock(mutex);
+    while (news.wait(lock, stop, [&] { return !found.empty(); })) {
+      const Endpoint endpoint = std::move(found.front());
+      found.pop_front();
+      lock.unlock();
+      try {
+        consider(endpoint);
+      } catch (const dds::SetupError& error) {
+        warn(endpoint.topic, error.what());
+      }
+      lock.lock();
+      if (stop.stop_requested()) return;
+    }
+  }
+
+  void consider(const Endpoint& endpoint) {
+    const auto name = dds::ros_topic(endpoint.topic);
+    if (!name || !dds::ros_type(endpoint.type) || !options.selection.wants(*name)) return;
+    TopicState* state = find(endpoint.topic);
+    if (!state) state = add(endpoint.topic, endpoint.type, endpoint.keyed);
+    if (!state) return;
+    if (state->wire_type != endpoint.type) {
+      return warn(endpoint.topic + endpoint.type,
+                  fmt::format("{}: got a second type {}, recorded is {}", *name, *dds::ros_type(endpoint.type), state->topic.type));
+    }
+    const Grade grade = grade_of(endpoint.reliable, endpoint.latched);
+    // What a reader asks for is what its writers will offer at least; better than nothing.
+    if (endpoint.kind == Endpoint::Kind::kReader && state->has_reader()) return;
+    if (!state->readers[grade]) read(*state, grade);
+  }
+
+  TopicState* find(const std::string& wire_name) const {
+    const std::lock_guard lock(mutex);
+    for (const auto& state : states) {
+      if (state->wire_name == wire_name) return state.get();
+    }
+    return nullptr;
+  }
+
+  // Nothing, and a warning, if it cannot be recorded.
+  TopicState* add(const std::string& wire_name, const std::string& wire_type, bool keyed) {
+    auto state = std::make_unique<TopicState>();
+    state->wire_name = wire_name;
+    state->wire_type = wire_type;
+    state->topic = {.name = *dds::ros_topic(wire_name), .type = *dds::ros_type(wire_type), .qos = {}, .definition = {}};
+    if (!dds::can_be_raw(wire_type, keyed)) {
+      warn(wire_name + wire_type, fmt::format("{}: type {} {}, and only types of this system can be recorded so; left out",
+                                              state->topic.name, state->topic.type, keyed ? "has a key" : "should have a key"));
+      return nullptr;
+    }
+    auto definition = options.definition(state->topic.type);
+    if (!definition) {
+      warn(wire_name + wire_type, fmt::format("{}: the definition of type {} is unknown; left out", state->topic.name, state->topic.type));
+      return nullptr;
+    }
+    state->topic.definition = *std::move(definition);
+    const std::lock_guard lock(mutex);
+    state->index = static_cast<int>(states.size());
+    states.push_back(std::move(state));
+    return states.back().get();
+  }
+
+  void read(TopicState& state, Grade grade) {
+    const dds::Qos qos{.reliable = grade != kBestEffort, .latched = grade == kLatched, .depth = dds::kKeepAll,
+                       .instances = state.system ? state.topic.qos.instances : 1};
+    state.readers[grade] = std::make_unique<dds::RawReader>(
+        *participant, dds::RawTopic{state.wire_name, state.wire_type, qos},
+        [this, &state](std::span<const std::byte> bytes, const dds::Origin& origin) {
+          {
+            const std::lock_guard lock(state.mutex);
+            if (!state.seen[origin.writer].insert(origin.sequence)) return;
+          }
+          options.on_sample(state.index, bytes, origin);
+        });
+  }
+
+  void warn(const std::string& about, const std::string& text) {
+    if (warned.insert(about).second && options.on_warning) options.on_warning(text);
+  }
+
+  const Options options;
+  std::optional<dds::Participant> participant;
+  std::set<std::string> warned;
+
+  mutable std::mutex mutex;  // guards all below but the readers
+  std::condition_variable_any news;
+  std::deque<Endpoint> found;
+  std::map<std::string, dds::Qos> offers;  // of the first writer, by the topic's name on the wire
+  std::deque<std::unique_ptr<TopicState>> states;
+
+  std::stop_source closing;
+  std::jthread worker;  // makes readers
+};
+
+Result<std::unique_ptr<Subscriptions>> Subscriptions::open(Options options) {
+  auto impl = std::make_unique<Impl>(std::move(options));
+  const auto watch = std::make_shared<dds::EndpointWatch>([impl = impl.get()](const Endpoint& endpoint) { impl->note(endpoint); });
+  auto participant_result =
+      dds::Participant::open({.name = "jostle_record", .domain = impl->options.domain, .watch = watch});
+  if (!participant_result) return participant_result.error();
+  impl->participant = *participant_result;
+  try {
+    impl->start();
+  } catch (const dds::SetupError& error) {
+    return Error{Code::kUnavailable, error.what()};
+  }
+  return std::unique_ptr<Subscriptions>(new Subscriptions(std::move(impl)));
+}
+
+Subscriptions::Subscriptions(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Subscriptions::~Subscriptions() = default;
+
+const dds::Participant& Subscriptions::participant() const { return *impl_->participant; }
+
+int Subscriptions::topics() const {
+  const std::lock_guard lock(impl_->mutex);
+  return static_cast<int>(impl_->states.size());
+}
+
+bag::Topic Subscriptions::topic(int index) const {
+  const std::lock_guard lock(impl_->mutex);
+  const TopicState& state = *impl_->states[static_cast<std::size_t>(index)];
+  bag::Topic topic = state.topic;
+  if (state.system) return topic;
+  const auto offer = impl_->offers.find(state.wire_name);
+  if (offer != impl_->offers.end()) topic.qos = offer->second;
+  return topic;
+}
+
+std::uint64_t Subscriptions::missing(int index) const {
+  const TopicState* state = nullptr;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    state = impl_->states[static_cast<std::size_t>(index)].get();
+  }
+  const std::lock_guard lock(state->mutex);
+  std::uint64_t sum = 0;
+  for (const auto& [writer, seen] : state->seen) sum += seen.missing();
+  return sum;
+}
+
+void Subscriptions::close() { impl_->close(); }
+
+}  // namespace jostle::services

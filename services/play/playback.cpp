@@ -162,7 +162,7 @@ Result<void> Playback::set_rate(double rate, TimePoint now) {
 
 Playback::State Playback::state() const {
   if (ended_) return State::kEnded;
-  if (seeking_ != Seeking::kNo) return State::kSeeking;
+  if (seeking_ != Seeking::kNo || steps_ > 0) return State::kSeeking;
   return paused_ ? State::kPaused : State::kPlaying;
 }
 

@@ -52,7 +52,12 @@ class Playback {
     virtual void on_moment(const std::vector<bag::Message>& state) = 0;
   };
 
-  enum class State { kSeeking, kPlaying, kPaused, kEnded };
+  enum class State {
+    kSeeking,  ///< finds a place, or reads the message of a step
+    kPlaying,
+    kPaused,
+    kEnded
+  };
 
   /// `sink` outlives it.
   /// Error kInvalidArgument: an empty bag, a start behind its end.

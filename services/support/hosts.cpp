@@ -10,14 +10,15 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <climits>
+#include <condition_variable>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
+#include <deque>
+#include <future>
+#include <mutex>
 #include <stdexcept>
 #include <system_error>
 #include <thread>
-#include <utility>
 
 namespace jostle::services {
 namespace {
@@ -37,19 +38,6 @@ void ip(const std::string& arguments) {
   }
 }
 
-// A namespace belongs to a thread.
-void on_a_thread(const std::function<void()>& act) {
-  std::exception_ptr problem;
-  std::thread([&] {
-    try {
-      act();
-    } catch (...) {
-      problem = std::current_exception();
-    }
-  }).join();
-  if (problem) std::rethrow_exception(problem);
-}
-
 // An Ethernet device of this network whose other side is a file.
 int new_tap(const std::string& name) {
   const int tap = check(open("/dev/net/tun", O_RDWR | O_NONBLOCK | O_CLOEXEC), "/dev/net/tun");
@@ -66,6 +54,60 @@ int new_tap(const std::string& name) {
 }
 
 }  // namespace
+
+// A thread with a network and a /dev/shm of its own, which what it starts inherits.
+//
+// One that stays: a process that asked to end with its parent ends with the thread that
+// started it (prctl(2), PR_SET_PDEATHSIG).
+class Hosts::Resident {
+ public:
+  Resident() : thread_([this](std::stop_token stop) { serve(stop); }) {
+    run([] {
+      check(unshare(CLONE_FS | CLONE_NEWNS | CLONE_NEWNET), "unshare");
+      check(mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr), "mount /");
+      check(mount("tmpfs", "/dev/shm", "tmpfs", 0, nullptr), "mount /dev/shm");
+    });
+  }
+
+  void run(const std::function<void()>& act) {
+    if (std::this_thread::get_id() == thread_.get_id()) return act();
+    std::packaged_task<void()> task(act);
+    std::future<void> done = task.get_future();
+    {
+      const std::lock_guard lock(mutex_);
+      tasks_.push_back(std::move(task));
+    }
+    wake_.notify_one();
+    done.get();
+  }
+
+  /// Its network, as a file that others can name.
+  std::string network() {
+    std::string file;
+    run([&] { file = fmt::format("/proc/{}/task/{}/ns/net", getpid(), gettid()); });
+    return file;
+  }
+
+ private:
+  void serve(std::stop_token stop) {
+    std::unique_lock lock(mutex_);
+    while (wake_.wait(lock, stop, [&] { return !tasks_.empty(); })) {
+      std::packaged_task<void()> task = std::move(tasks_.front());
+      tasks_.pop_front();
+      lock.unlock();
+      task();
+      lock.lock();
+    }
+  }
+
+  std::mutex mutex_;  // guards tasks_
+  std::condition_variable_any wake_;
+  std::deque<std::packaged_task<void()>> tasks_;
+  std::jthread thread_;  // last: uses all of the above
+};
+
+Hosts::Hosts() = default;
+Hosts::~Hosts() = default;
 
 std::string Hosts::address(int host) { return fmt::format("10.77.0.{}", host); }
 
@@ -86,18 +128,18 @@ Result<std::unique_ptr<Hosts>> Hosts::make(int count, const LinkQuality& quality
 
 void Hosts::build(int count, const LinkQuality& quality) {
   if (!quality.perfect()) cables_ = std::make_unique<Cables>(quality);
-  switch_ = new_place();
-  inside(switch_, [] { ip("link add hub type bridge"), ip("link set hub up"); });
+  switch_ = std::make_unique<Resident>();
+  switch_->run([] { ip("link add hub type bridge"), ip("link set hub up"); });
   for (int host = 1; host <= count; ++host) {
-    places_.push_back(new_place());
+    hosts_.push_back(std::make_unique<Resident>());
     connect(host, quality);
-    inside(places_.back(), [&] {
+    on(host, [&] {
       ip("link set lo up");
       ip(fmt::format("addr add {}/24 dev eth", address(host)));
       ip("link set eth up");
       ip("route add 239.0.0.0/8 dev eth");
     });
-    inside(switch_, [&] { ip(fmt::format("link set port{} master hub", host)); });
+    switch_->run([&] { ip(fmt::format("link set port{} master hub", host)); });
     plug(host, true);
   }
   if (cables_) cables_->start();
@@ -107,58 +149,24 @@ void Hosts::build(int count, const LinkQuality& quality) {
 void Hosts::connect(int host, const LinkQuality& quality) {
   const std::string port = fmt::format("port{}", host);
   if (quality.perfect()) {
-    inside(places_.back(), [&] {
-      ip(fmt::format("link add eth type veth peer name {} netns /proc/{}/fd/{}", port, getpid(), switch_.network));
-    });
+    const std::string network = switch_->network();
+    on(host, [&] { ip(fmt::format("link add eth type veth peer name {} netns {}", port, network)); });
     return;
   }
   int host_end = -1, switch_end = -1;
-  inside(places_.back(), [&] { host_end = new_tap("eth"); });
-  inside(switch_, [&] { switch_end = new_tap(port); });
+  on(host, [&] { host_end = new_tap("eth"); });
+  switch_->run([&] { switch_end = new_tap(port); });
   cables_->add(host_end, switch_end);
 }
 
-Hosts::~Hosts() {
-  places_.push_back(switch_);
-  for (const Place& place : places_) {
-    if (place.network >= 0) close(place.network);
-    if (place.mounts >= 0) close(place.mounts);
-  }
-}
-
 void Hosts::on(int host, const std::function<void()>& act) const {
-  inside(places_.at(static_cast<std::size_t>(host - 1)), act);
+  hosts_.at(static_cast<std::size_t>(host - 1))->run(act);
 }
 
 void Hosts::plug(int host, bool in) const {
-  inside(switch_, [&] { ip(fmt::format("link set port{} {}", host, in ? "up" : "down")); });
+  switch_->run([&] { ip(fmt::format("link set port{} {}", host, in ? "up" : "down")); });
 }
 
 CableCounts Hosts::counts() const { return cables_ ? cables_->counts() : CableCounts{}; }
-
-void Hosts::inside(const Place& place, const std::function<void()>& act) {
-  on_a_thread([&] {
-    // Entering a mount namespace leads to its root; what is started should not notice.
-    char here[PATH_MAX];
-    const bool known = getcwd(here, sizeof here) != nullptr;
-    check(unshare(CLONE_FS), "unshare");
-    check(setns(place.mounts, CLONE_NEWNS), "setns");
-    check(setns(place.network, CLONE_NEWNET), "setns");
-    if (known) check(chdir(here), here);
-    act();
-  });
-}
-
-Hosts::Place Hosts::new_place() {
-  Place place;
-  on_a_thread([&] {
-    check(unshare(CLONE_FS | CLONE_NEWNS | CLONE_NEWNET), "unshare");
-    check(mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr), "mount /");
-    check(mount("tmpfs", "/dev/shm", "tmpfs", 0, nullptr), "mount /dev/shm");
-    place.network = check(open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC), "ns/net");
-    place.mounts = check(open("/proc/thread-self/ns/mnt", O_RDONLY | O_CLOEXEC), "ns/mnt");
-  });
-  return place;
-}
 
 }  // namespace jostle::services

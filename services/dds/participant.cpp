@@ -152,7 +152,7 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
   if (!domain_result) return domain_result.error();
   auto transport_result = choose_transport(options.transport);
   if (!transport_result) return transport_result.error();
-  const std::string way = environment("JOSTLE_DISCOVERY"), identity = environment("JOSTLE_SECURE");
+  const std::string way = environment("JOSTLE_DISCOVERY"), identity = options.identity.value_or(environment("JOSTLE_SECURE"));
   auto discovery_result = parse_discovery(way.empty() || server ? "multicast" : way);
   if (!discovery_result) return discovery_result.error();
   DomainParticipantQos qos = make_qos(options.name, *transport_result);

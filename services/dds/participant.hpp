@@ -33,6 +33,7 @@ struct ParticipantOptions {
   /// Else JOSTLE_DDS_TRANSPORT ("udp" or "default"), else kDefault when
   /// FASTRTPS_DEFAULT_PROFILES_FILE is set, else kUdp.
   std::optional<Transport> transport;
+  std::optional<std::string> identity;  ///< folder; empty: unprotected; else JOSTLE_SECURE
 };
 
 /// A discovery server: listens there, introduces participants to each other.

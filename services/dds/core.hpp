@@ -9,6 +9,8 @@
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <map>
 #include <mutex>
+#include <string>
+#include <vector>
 
 #include "services/dds/participant.hpp"
 #include "services/dds/qos.hpp"
@@ -20,7 +22,7 @@ std::uint64_t participant_id(const eprosima::fastrtps::rtps::GUID_t& guid);
 
 class Participant::Core {
  public:
-  Core(eprosima::fastdds::dds::DomainParticipant* participant, int domain);
+  Core(eprosima::fastdds::dds::DomainParticipant* participant, int domain, std::string space);
   ~Core();
   Core(const Core&) = delete;
   Core& operator=(const Core&) = delete;
@@ -35,6 +37,7 @@ class Participant::Core {
   eprosima::fastdds::dds::Publisher* const publisher;
   eprosima::fastdds::dds::Subscriber* const subscriber;
   const int domain;
+  const std::string space;  // namespace
 
  private:
   std::mutex mutex_;  // guards users_ and the creation of topics
@@ -44,6 +47,10 @@ class Participant::Core {
 /// What a participant of the profile udp or shared_memory is where the file of profiles does not
 /// say; nothing for other names.
 std::optional<eprosima::fastdds::dds::DomainParticipantQos> built_in_participant(const std::string& profile);
+
+/// Names of the profiles for an endpoint, the first that the file has is in force: of its topic, of
+/// the topic without the namespace, of the topic's kind.
+std::vector<std::string> profiles_for(const Participant::Core& core, const std::string& topic, const Qos& qos);
 
 /// A writer of this Qos where the file of profiles does not say; `apply` is a reader's.
 void apply_to_writer(const Qos& qos, eprosima::fastdds::dds::DataWriterQos& writer);

@@ -49,7 +49,7 @@ class Reader : public ReaderBase {
   using OnSample = std::function<void(const T&)>;
 
   Reader(const Participant& participant, const Topic<T>& topic, OnSample on_sample)
-      : ReaderBase(participant, topic.name, topic.qos,
+      : ReaderBase(participant, participant.wire_name(topic.name, topic.scope), topic.qos,
                    eprosima::fastdds::dds::TypeSupport(new Serializer<T>()),
                    [on_sample = std::move(on_sample)](const void* sample) {
                      on_sample(*static_cast<const T*>(sample));

@@ -14,8 +14,8 @@ namespace {
 
 using namespace std::chrono_literals;
 using nlohmann::json;
-using ::testing::ElementsAre;
 using services::Hosts;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;

@@ -128,8 +128,6 @@ Check check_clock(const Pair& pair) {
 
 // --- datagrams ----------------------------------------------------------------
 
-// "" if one of some equal datagrams came through, else what happened.
-
 json question(const char* what, bool multicast, std::size_t bytes) {
   return {{"ask", what}, {"multicast", multicast}, {"text", fmt::format("jostle doctor {}", getpid())}, {"size", bytes}};
 }
@@ -139,6 +137,7 @@ std::string said_wrong(const Result<json>& answer) {
   return answer->value("error", "");
 }
 
+// Both: "" if one of some equal datagrams came through, else what happened.
 std::string there(const Pair& pair, bool multicast, std::size_t bytes) {
   json asked = question("listen", multicast, bytes);
   const auto place = pair.line.ask(asked);
@@ -194,7 +193,7 @@ std::vector<Check> check_datagrams(const Pair& pair) {
 std::string remedy_for_strangers(const Pair& pair, bool found) {
   if (found) return "same version and profiles.xml on both; with --secure, identities whose role may say it (keystores from before this check: issue anew)";
   switch (pair.discovery.mode) {
-    case Discovery::Mode::kMulticast: return fmt::format("--discovery peers:{} on both, if multicast is ok above have a look at --secure", pair.both());
+    case Discovery::Mode::kMulticast: return fmt::format("if multicast FAILs: --discovery peers:{} on both; else firewalls: UDP ports of the domain", pair.both());
     case Discovery::Mode::kPeers: return fmt::format("--discovery peers:{} on both; firewalls: UDP ports of the domain, see UDP", pair.both());
     case Discovery::Mode::kServer: break;
   }
@@ -285,7 +284,10 @@ std::vector<Check> check_discovery_servers(const dds::Participant& participant) 
   return checks;
 }
 
-std::vector<Check> check_peer(const PeerOptions& peer, const dds::ParticipantOptions& options) {
+namespace {
+
+// Throws what the JSON library throws at answers that are none.
+std::vector<Check> examine(const PeerOptions& peer, const dds::ParticipantOptions& options) {
   const auto address_result = dds::resolve(peer.host);
   if (!address_result) return {{"peer", Verdict::kFail, address_result.error().message, "its address instead of its name, or a line in /etc/hosts"}};
   const in_addr there{inet_addr(address_result->c_str())};
@@ -325,6 +327,17 @@ std::vector<Check> check_peer(const PeerOptions& peer, const dds::ParticipantOpt
   add(check_datagrams(pair));
   add(met);
   return checks;
+}
+
+}  // namespace
+
+std::vector<Check> check_peer(const PeerOptions& peer, const dds::ParticipantOptions& options) {
+  try {
+    return examine(peer, options);
+  } catch (const json::exception& problem) {
+    return {{"peer", Verdict::kFail, fmt::format("{}, TCP port {}: {}", peer.host, peer.port, problem.what()),
+             "see that `jostle doctor --listen` of the same version is there, and nothing else"}};
+  }
 }
 
 }  // namespace jostle::services

@@ -2,8 +2,11 @@
 // with the remedy.
 
 #include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "services/support/hosts.hpp"
 #include "tests/support/program_process.hpp"
@@ -125,6 +128,32 @@ TEST_F(Doctor, NamesACableThatIsOut) {
 TEST_F(Doctor, NamesADoctorThatDoesNotListen) {
   ask();
   expect_failed({"peer"}, "Connection refused", "start `jostle doctor --listen` there");
+}
+
+TEST_F(Doctor, NamesADoorThatIsNoDoctors) {
+  int door = -1;
+  hosts->on(kThere, [&] {
+    door = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in here{};
+    here.sin_family = AF_INET;
+    here.sin_port = htons(11812);
+    ASSERT_EQ(bind(door, reinterpret_cast<const sockaddr*>(&here), sizeof here), 0);
+    ASSERT_EQ(::listen(door, 1), 0);
+  });
+  const std::jthread stranger([door] {
+    const int guest = accept(door, nullptr, nullptr);
+    const std::string facts = "{\"host\":1}\n";
+    send(guest, facts.data(), facts.size(), MSG_NOSIGNAL);
+    char question[64];
+    while (recv(guest, question, sizeof question, 0) > 0) continue;
+    close(guest);
+  });
+
+  ask();
+
+  shutdown(door, SHUT_RDWR);  // should nobody have come
+  close(door);
+  expect_failed({"peer"}, "facts of the other doctor", "of the same version");
 }
 
 TEST_F(Doctor, NamesBlockedMulticast) {

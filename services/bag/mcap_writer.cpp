@@ -73,8 +73,10 @@ class McapWriter final : public FileWriter {
     return chunk_.size() < kChunkBytes ? Result<void>() : close_chunk();
   }
 
-  Result<void> flush() override {
+  // A note that changes is written again: of several under one name the last one counts.
+  Result<void> flush(const Notes& notes) override {
     if (failure_) return *failure_;
+    for (const auto& [name, note] : notes) append_metadata({.name = name, .metadata = note}, pending_);
     return close_chunk();
   }
 
@@ -82,7 +84,7 @@ class McapWriter final : public FileWriter {
     // In front of the chunk that it speaks of, so that it is there whenever the chunk is.
     const Metadata record{.name = kRepeatedNote, .metadata = {{"chunks", "1"}}};
     append_metadata(record, pending_);
-    return flush();
+    return flush({});
   }
 
   Result<void> close(const Notes& notes) override {

@@ -77,14 +77,16 @@ class SqliteWriter final : public FileWriter {
     return open_bytes_ < kTransactionBytes ? Result<void>() : commit();
   }
 
-  Result<void> flush() override {
+  Result<void> flush(const Notes& notes) override {
     if (failure_) return *failure_;
+    for (const auto& [name, note] : notes) {
+      if (auto ok = kept(put_note(name, note)); !ok) return ok;
+    }
     return commit();
   }
 
   Result<void> end_repeated() override {
-    if (auto ok = add_note(kRepeatedRow, {{"messages", std::to_string(messages_)}}); !ok) return kept(ok);
-    return flush();
+    return flush({{kRepeatedRow, {{"messages", std::to_string(messages_)}}}});
   }
 
   Result<void> close(const Notes& notes) override {
@@ -130,10 +132,14 @@ class SqliteWriter final : public FileWriter {
     return result;
   }
 
-  Result<void> add_note(const std::string& name, const Note& note) {
+  Result<void> put_note(const std::string& name, const Note& note) {
     if (!database_.is_in_transaction()) {
       if (auto ok = database_.run("BEGIN"); !ok) return ok;
     }
+    auto remove_result = database_.prepare(fmt::format("DELETE FROM {} WHERE name = ?", kNotesTable));
+    if (!remove_result) return remove_result.error();
+    remove_result->bind(1, name);
+    if (auto ok = remove_result->run(); !ok) return ok;
     auto statement_result = database_.prepare(fmt::format("INSERT INTO {}(name, key, value) VALUES (?, ?, ?)", kNotesTable));
     if (!statement_result) return statement_result.error();
     for (const auto& [key, value] : note) {
@@ -148,7 +154,7 @@ class SqliteWriter final : public FileWriter {
   Result<void> complete(const Notes& notes) {
     Result<void> ok;
     for (const auto& [name, note] : notes) {
-      if (ok) ok = add_note(name, note);
+      if (ok) ok = put_note(name, note);
     }
     if (database_.is_in_transaction()) {
       if (ok) ok = database_.run("COMMIT");

@@ -362,7 +362,12 @@ TEST_P(BagContract, KeepsWhatWasFlushedWhenTheWriterIsKilled) {
       [&] {
         const auto sut = writer();
         const int x = taken(sut->add_topic(string_topic("/x")));
-        for (int i = 0; i < 1000; ++i) write(*sut, x, kBegin + i, std::to_string(i));
+        sut->set_note("lost", {{"/x", "1"}});
+        for (int i = 0; i < 1000; ++i) {
+          write(*sut, x, kBegin + i, std::to_string(i));
+          if (i == 500) taken(sut->flush());
+        }
+        sut->set_note("lost", {{"/x", "2"}});
         taken(sut->flush());
         write(*sut, x, kBegin + 1000, "1000");
         raise(SIGKILL);
@@ -372,6 +377,7 @@ TEST_P(BagContract, KeepsWhatWasFlushedWhenTheWriterIsKilled) {
   const auto messages = rest_of(*saved);
   ASSERT_GE(messages.size(), 1000u);
   for (int i = 0; i < 1000; ++i) EXPECT_EQ(text_of(messages[static_cast<std::size_t>(i)].data), std::to_string(i));
+  EXPECT_EQ(saved->info().notes.at("lost"), (bag::Note{{"/x", "2"}}));
 }
 
 // The limit on a file's size, its signal ignored, stands for a full disk: write() takes what

@@ -16,8 +16,8 @@ constexpr const char* kExample =
     "  jostle bag export experiment --csv -o tables      a table per topic\n"
     "  jostle bag export experiment --json --topic '/robot/*' --from 10 --to 12 | jq .message.q\n"
     "A bag is a folder, or one of its files (.mcap, .db3); those of rosbag2 are read, too. docs/bags.md says more.\n"
-    "Exit codes: 0 done, 1 damaged or nothing to show, 2 wrong arguments or no bag, 3 output cannot be written,\n"
-    "130 interrupted.";
+    "Exit codes: 0 done, 1 verified and damaged, or nothing to save or export, 2 wrong arguments or a bag that cannot be\n"
+    "opened, 3 output cannot be written, 130 interrupted.";
 
 }  // namespace
 

@@ -380,6 +380,40 @@ TEST_P(BagContract, KeepsWhatWasFlushedWhenTheWriterIsKilled) {
   EXPECT_EQ(saved->info().notes.at("lost"), (bag::Note{{"/x", "2"}}));
 }
 
+// Killed in the middle of whatever it does, not where it is convenient.
+TEST_P(BagContract, KeepsWhatWasFlushedWheneverTheWriterIsKilled) {
+  for (int round = 1; round <= 8; ++round) {
+    SCOPED_TRACE(round);
+    const fs::path bag = folder_.path() / ("killed-" + std::to_string(round));
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      const auto sut = taken(BagWriter::create(bag, GetParam().options));
+      const int x = taken(sut->add_topic(string_topic("/x")));
+      for (int count = 0;; ++count) {
+        write(*sut, x, kBegin + count, std::to_string(count));
+        if (count % 97 != 96) continue;
+        taken(sut->flush());
+        const int flushed = count + 1;
+        if (::write(ends[1], &flushed, sizeof flushed) != sizeof flushed) _exit(1);
+      }
+    }
+    close(ends[1]);
+    int flushed = 0;
+    for (int i = 0; i < round * round; ++i) ASSERT_EQ(read(ends[0], &flushed, sizeof flushed), static_cast<ssize_t>(sizeof flushed));
+    kill(child, SIGKILL);
+    while (read(ends[0], &flushed, sizeof flushed) == static_cast<ssize_t>(sizeof flushed)) continue;
+    close(ends[0]);
+    ASSERT_EQ(waitpid(child, nullptr, 0), child);
+    const auto saved = taken(bag::open_bag(bag, true));
+    const auto messages = rest_of(*saved);
+    ASSERT_GE(messages.size(), static_cast<std::size_t>(flushed));
+    for (std::size_t i = 0; i < messages.size(); ++i) ASSERT_EQ(text_of(messages[i].data), std::to_string(i));
+  }
+}
+
 // The limit on a file's size, its signal ignored, stands for a full disk: write() takes what
 // fits, then fails.
 TEST_P(BagContract, EndsAtItsLastWholeChunkWhenTheDiskIsFull) {

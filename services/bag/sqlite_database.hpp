@@ -57,8 +57,9 @@ class Database {
   /// A new one, to be written.
   static Result<Database> create(const std::filesystem::path& file);
   /// One that is there. Rolls back what a killed writer has left half done, as every program
-  /// that opens it does.
-  static Result<Database> open(const std::filesystem::path& file);
+  /// that opens it does. `recover`: one whose last pages are missing, too,
+  /// unless a page is cut in two.
+  static Result<Database> open(const std::filesystem::path& file, bool recover);
 
   Result<void> run(const std::string& sql);
   Result<Statement> prepare(const std::string& sql) const;

@@ -258,7 +258,7 @@ class SqliteReader final : public FileReader {
 }  // namespace
 
 Result<std::unique_ptr<FileReader>> open_sqlite(const std::filesystem::path& file, const OpenOptions& options) {
-  auto database_result = Database::open(file);
+  auto database_result = Database::open(file, options.recover);
   if (!database_result) return database_result.error();
   auto reader = std::make_unique<SqliteReader>(std::move(*database_result), options);
   if (auto ok = reader->open(); !ok) return ok.error();

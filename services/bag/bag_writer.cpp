@@ -57,7 +57,9 @@ class FolderWriter final : public BagWriter {
     open.sequence = counted.sequence;
     if (!file_start_) file_start_ = message.log_time;
     if (open.topic.qos.latched && may_split()) {
-      open.last = Message{.topic = topic, .publish_time = counted.publish_time, .sequence = counted.sequence,
+      open.last = Message{.topic = topic,
+                          .publish_time = counted.publish_time,
+                          .sequence = counted.sequence,
                           .data = {message.data.begin(), message.data.end()}};
     }
     return {};

@@ -23,11 +23,13 @@ class Statement {
   void bind(int parameter, std::int64_t value) { sqlite3_bind_int64(statement_.get(), parameter, value); }
   /// What is bound is not copied: it stays where it is until the statement is reset.
   void bind(int parameter, std::string_view text) {
-    sqlite3_bind_text64(statement_.get(), parameter, text.data() == nullptr ? "" : text.data(), text.size(), SQLITE_STATIC, SQLITE_UTF8);
+    sqlite3_bind_text64(statement_.get(), parameter, text.data() == nullptr ? "" : text.data(), text.size(),
+                        SQLITE_STATIC, SQLITE_UTF8);
   }
   void bind(int parameter, std::span<const std::byte> bytes) {
-    sqlite3_bind_blob64(statement_.get(), parameter, bytes.data() == nullptr ? "" : static_cast<const void*>(bytes.data()),
-                        bytes.size(), SQLITE_STATIC);
+    sqlite3_bind_blob64(statement_.get(), parameter,
+                        bytes.data() == nullptr ? "" : static_cast<const void*>(bytes.data()), bytes.size(),
+                        SQLITE_STATIC);
   }
 
   /// Whether there is a (further) row.

@@ -26,7 +26,8 @@ constexpr const char* kTables =
     "CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);"
     "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
     " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);"
-    "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
+    "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB "
+    "NOT NULL);"
     "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
     "CREATE TABLE jostle_notes(name TEXT NOT NULL, key TEXT NOT NULL, value TEXT NOT NULL);"
     "INSERT INTO schema(schema_version, ros_distro) VALUES (3, 'humble');"
@@ -85,9 +86,7 @@ class SqliteWriter final : public FileWriter {
     return commit();
   }
 
-  Result<void> end_repeated() override {
-    return flush({{kRepeatedRow, {{"messages", std::to_string(messages_)}}}});
-  }
+  Result<void> end_repeated() override { return flush({{kRepeatedRow, {{"messages", std::to_string(messages_)}}}}); }
 
   Result<void> close(const Notes& notes) override {
     if (is_closed_) return {};
@@ -140,7 +139,8 @@ class SqliteWriter final : public FileWriter {
     if (!remove_result) return remove_result.error();
     remove_result->bind(1, name);
     if (auto ok = remove_result->run(); !ok) return ok;
-    auto statement_result = database_.prepare(fmt::format("INSERT INTO {}(name, key, value) VALUES (?, ?, ?)", kNotesTable));
+    auto statement_result =
+        database_.prepare(fmt::format("INSERT INTO {}(name, key, value) VALUES (?, ?, ?)", kNotesTable));
     if (!statement_result) return statement_result.error();
     for (const auto& [key, value] : note) {
       statement_result->bind(1, name);

@@ -42,8 +42,8 @@ class FileWriter {
   virtual Result<void> end_repeated() = 0;
   virtual Result<void> close(const Notes& notes) = 0;  ///< as flush(), and what ends a file
 
-  virtual std::uint64_t bytes() const = 0;     ///< written or about to be
-  virtual WrittenFile written() const = 0;     ///< handed to the operating system
+  virtual std::uint64_t bytes() const = 0;  ///< written or about to be
+  virtual WrittenFile written() const = 0;  ///< handed to the operating system
 };
 
 struct FileInfo {

@@ -104,7 +104,11 @@ class BagSides {
     const auto topic_result = (*writer_result)->add_topic({.name = "/x", .type = "some_msgs/msg/Bytes"});
     if (!topic_result) return topic_result.error();
     const auto rate_result = bag_watch.rate([&](int i) -> Result<void> {
-      if (auto ok = (*writer_result)->write(*topic_result, {.log_time = i, .publish_time = i, .data = message(bytes_, i)}); !ok) return ok;
+      if (auto ok =
+              (*writer_result)->write(*topic_result, {.log_time = i, .publish_time = i, .data = message(bytes_, i)});
+          !ok) {
+        return ok;
+      }
       return i + 1 < kMessages ? Result<void>() : (*writer_result)->flush();
     });
     if (!rate_result) return rate_result.error();
@@ -176,7 +180,8 @@ Result<Measurements> measure_bag(const Settings& settings) {
       measurement_result->details = {{"worst write() of the bag, us", sides.bag_watch.worst_us()},
                                      {"worst bare append, us", sides.bare_watch.worst_us()},
                                      {"read back, messages/s", median(sides.read_rates)},
-                                     {"size of the bag, of the bytes in it", static_cast<double>(sides.bag_bytes) / static_cast<double>(bytes.size())}};
+                                     {"size of the bag, of the bytes in it",
+                                      static_cast<double>(sides.bag_bytes) / static_cast<double>(bytes.size())}};
       measurements.push_back(std::move(*measurement_result));
     }
     return measurements;

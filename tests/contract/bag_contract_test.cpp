@@ -9,8 +9,8 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <functional>
 #include <fstream>
+#include <functional>
 
 #include "services/bag/folder_reader.hpp"
 #include "tests/support/bags.hpp"
@@ -308,7 +308,8 @@ TEST_P(BagContract, SaysWhatIsNotABag) {
   EXPECT_EQ(BagReader::open(bag_).error().code, Code::kNotFound);
   fs::create_directory(bag_);
   EXPECT_THAT(BagReader::open(bag_).error().message, HasSubstr("wanted a bag"));
-  const auto foreign = folder_.write(std::string("notes") + GetParam().extension, "These are no messages, but a text of some length.");
+  const auto foreign =
+      folder_.write(std::string("notes") + GetParam().extension, "These are no messages, but a text of some length.");
   const auto error = BagReader::open(foreign).error();
   EXPECT_EQ(error.code, Code::kInvalidArgument);
   EXPECT_THAT(error.message, HasSubstr(foreign.string()));
@@ -402,7 +403,9 @@ TEST_P(BagContract, KeepsWhatWasFlushedWheneverTheWriterIsKilled) {
     }
     close(ends[1]);
     int flushed = 0;
-    for (int i = 0; i < round * round; ++i) ASSERT_EQ(read(ends[0], &flushed, sizeof flushed), static_cast<ssize_t>(sizeof flushed));
+    for (int i = 0; i < round * round; ++i) {
+      ASSERT_EQ(read(ends[0], &flushed, sizeof flushed), static_cast<ssize_t>(sizeof flushed));
+    }
     kill(child, SIGKILL);
     while (read(ends[0], &flushed, sizeof flushed) == static_cast<ssize_t>(sizeof flushed)) continue;
     close(ends[0]);
@@ -434,7 +437,9 @@ TEST_P(BagContract, EndsAtItsLastWholeChunkWhenTheDiskIsFull) {
         }
         if (ok) throw std::runtime_error("the limit has no effect");
         if (ok.error().code != Code::kIo) throw std::runtime_error(ok.error().message);
-        if (ok.error().message.find(file(0).string()) == std::string::npos) throw std::runtime_error(ok.error().message);
+        if (ok.error().message.find(file(0).string()) == std::string::npos) {
+          throw std::runtime_error(ok.error().message);
+        }
         if (sut->write(x, {.log_time = kBegin})) throw std::runtime_error("it goes on after a failure");
         taken(sut->close());
       },
@@ -471,7 +476,9 @@ TEST_P(BagContract, IsCompletedOnAFullDisk) {
     fs::remove(folder_.path() / "another's");
     const auto back = reader();
     const auto messages = rest_of(*back);
-    if (messages.size() < 1000 || messages.size() != back->info().messages) throw std::runtime_error("messages are missing");
+    if (messages.size() < 1000 || messages.size() != back->info().messages) {
+      throw std::runtime_error("messages are missing");
+    }
   };
   int status = 0;
   in_child(work, [&](int ended) {

@@ -28,7 +28,9 @@ constexpr bag::Time kSecond = 1'000'000'000;
 Bytes point(double x, double y, double z) {
   Bytes bytes(28);
   bytes[1] = std::byte{1};
-  for (const auto& [at, value] : {std::pair{4, x}, {12, y}, {20, z}}) std::memcpy(bytes.data() + at, &value, sizeof value);
+  for (const auto& [at, value] : {std::pair{4, x}, {12, y}, {20, z}}) {
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+  }
   return bytes;
 }
 
@@ -45,14 +47,21 @@ class BagCli : public ::testing::TestWithParam<BagOptions::Storage> {
   void write_bag() {
     const auto writer = taken(BagWriter::create(path, {.storage = GetParam()}));
     const int text = taken(writer->add_topic(string_topic("/robot/text", dds::kLatched)));
-    bag::Topic points{.name = "/robot/point", .type = "geometry_msgs/msg/Point", .qos = dds::kStream,
+    bag::Topic points{.name = "/robot/point",
+                      .type = "geometry_msgs/msg/Point",
+                      .qos = dds::kStream,
                       .definition = bag::definition_of("geometry_msgs/msg/Point").value()};
     const int where = taken(writer->add_topic(points));
     const int other = taken(writer->add_topic({.name = "/other", .type = "some_msgs/msg/Other"}));
     for (int i = 0; i <= 20; ++i) {
       const bag::Time time = kBegin + i * kSecond / 2;
-      if (i % 2 == 0) taken(writer->write(text, {.log_time = time, .publish_time = time, .data = cdr_of("a \"text\", " + std::to_string(i / 2))}));
-      taken(writer->write(where, {.log_time = time, .publish_time = time, .data = point(i, 0.25, i == 4 ? std::numeric_limits<double>::infinity() : -1)}));
+      if (i % 2 == 0) {
+        taken(writer->write(
+            text, {.log_time = time, .publish_time = time, .data = cdr_of("a \"text\", " + std::to_string(i / 2))}));
+      }
+      taken(writer->write(where, {.log_time = time,
+                                  .publish_time = time,
+                                  .data = point(i, 0.25, i == 4 ? std::numeric_limits<double>::infinity() : -1)}));
       if (i % 5 == 0) taken(writer->flush());
     }
     taken(writer->write(other, {.log_time = kBegin + 1, .publish_time = kBegin + 1, .data = noise(10, 1)}));
@@ -83,7 +92,9 @@ class BagCli : public ::testing::TestWithParam<BagOptions::Storage> {
     }
   }
 
-  fs::path file() const { return fs::path(path) / (GetParam() == BagOptions::Storage::kMcap ? "run_0.mcap" : "run_0.db3"); }
+  fs::path file() const {
+    return fs::path(path) / (GetParam() == BagOptions::Storage::kMcap ? "run_0.mcap" : "run_0.db3");
+  }
 
   TempFolder folder;
   std::string path = folder.path() / "run";
@@ -93,7 +104,8 @@ class BagCli : public ::testing::TestWithParam<BagOptions::Storage> {
 TEST_P(BagCli, InfoShowsTopicsCountsLossesAndNotes) {
   write_bag();
   ASSERT_EQ(run({"info", path}), 0) << program->err();
-  for (const char* words : {"messages  33", "duration  10.000 s", "2023-11-14 22:13:20.000000 UTC", "/robot/text", "best effort", "reliable, latched", "command: jostle record"}) {
+  for (const char* words : {"messages  33", "duration  10.000 s", "2023-11-14 22:13:20.000000 UTC", "/robot/text",
+                            "best effort", "reliable, latched", "command: jostle record"}) {
     EXPECT_THAT(program->out(), HasSubstr(words));
   }
   EXPECT_THAT(program->out(), ::testing::ContainsRegex("/robot/point +geometry_msgs/msg/Point +21 +2.1 +3 "));
@@ -170,7 +182,8 @@ TEST_P(BagCli, ExportsTables) {
   EXPECT_THAT(contents(tables + "/robot_text.csv"),
               StartsWith("time_s,log_time_ns,publish_time_ns,data\r\n"
                          "0.000000000,1700000000000000000,1700000000000000000,\"a \"\"text\"\", 0\"\r\n"));
-  EXPECT_THAT(contents(tables + "/robot_point.csv"), HasSubstr("2.000000000,1700000002000000000,1700000002000000000,4.0,0.25,inf\r\n"));
+  EXPECT_THAT(contents(tables + "/robot_point.csv"),
+              HasSubstr("2.000000000,1700000002000000000,1700000002000000000,4.0,0.25,inf\r\n"));
   EXPECT_EQ(run({"export", path, "--csv", "--topic", "/robot/p*", "--from", "1", "--to", "2"}), 0) << program->err();
   EXPECT_THAT(program->out(), StartsWith("time_s,log_time_ns,publish_time_ns,x,y,z\r\n1.000000000,"));
   EXPECT_EQ(std::ranges::count(program->out(), '\n'), 4);
@@ -205,8 +218,9 @@ TEST_P(BagCli, LeavesNothingBehindWhenInterrupted) {
     taken(writer->close());
   }
   const fs::path tables = folder.path() / "tables", saved = folder.path() / "run-recovered";
-  for (const auto& [arguments, made] : {std::pair<std::vector<std::string>, fs::path>{{"export", path, "--csv", "-o", tables}, tables / "x.csv"},
-                                        {{"recover", path}, saved}}) {
+  for (const auto& [arguments, made] :
+       {std::pair<std::vector<std::string>, fs::path>{{"export", path, "--csv", "-o", tables}, tables / "x.csv"},
+        {{"recover", path}, saved}}) {
     ProgramProcess sut("jostle_bag", arguments, folder);
     ASSERT_TRUE(soon(30s, [&] { return fs::exists(made) || sut.code(); }));
     sut.signal(SIGINT);

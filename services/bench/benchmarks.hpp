@@ -3,7 +3,9 @@
 /// Everything that can be measured. docs/benchmarks.md says why.
 
 #include <chrono>
+#include <functional>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "services/bench/measurement.hpp"
@@ -14,8 +16,9 @@ namespace jostle::services {
 struct Settings {
   int repeats = 0;           ///< >= 1
   std::vector<int> workers;  ///< of `scheduling`: processes, one measurement each
-  int domain = 0;            ///< DDS domain that nobody else uses
+  int domain = 0;            ///< DDS domain that nobody else uses, nor the next one
   std::stop_token stop;
+  std::function<void(const std::string& line)> on_news;  ///< while it takes long; never empty
 };
 
 using Measurements = std::vector<Measurement>;
@@ -39,6 +42,17 @@ Result<Measurements> measure_early_stop(const Settings& settings);
 /// Worker processes that wait instead of simulating: the time their waiting
 /// takes when nobody idles, against the time the batch took.
 Result<Measurements> measure_scheduling(const Settings& settings);
+
+/// The same with the workers spread over hosts.
+Result<Measurements> measure_hosts_scheduling(const Settings& settings);
+
+/// Round trips and throughput between two hosts over a good and a bad link, through a
+/// protected and an unprotected domain, microseconds and MB/s.
+Result<Measurements> measure_hosts(const Settings& settings);
+
+/// A plan while a host of workers is unplugged for a while, against the same plan left
+/// alone, seconds.
+Result<Measurements> measure_unplugged(const Settings& settings);
 
 /// One step of 1 s of every coarse model against one of the fine model, microseconds.
 /// The sides answer the same question, not alike.

@@ -2,16 +2,19 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <span>
 #include <thread>
+#include <vector>
 
 #include "services/bag/bag_reader.hpp"
 #include "services/bag/bag_writer.hpp"
@@ -40,6 +43,7 @@ constexpr int kPositions = 124;     // doubles: the message has 1028 bytes
 constexpr int kVariants = 1024;     // messages made beforehand, sent in turns
 constexpr std::chrono::milliseconds kBeat{1};  // of the publisher: what is due goes out in a burst
 constexpr std::chrono::seconds kPatience{30};
+constexpr std::chrono::seconds kVisit{1};  // of a recorder beside a plan
 constexpr double kLoopSeconds = 3.0;  // of the loops beside it
 
 // CDR of joint states whose positions are noise, which does not compress; the stamp has room
@@ -249,8 +253,17 @@ void print(const json& all) {
   }
 }
 
-// A plan of several seconds; the value is its time, the hash its own.
-Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder) {
+// Of all processes that were started and have ended, theirs included.
+double children_cpu_seconds() {
+  rusage used{};
+  getrusage(RUSAGE_CHILDREN, &used);
+  const auto seconds = [](const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); };
+  return seconds(used.ru_utime) + seconds(used.ru_stime);
+}
+
+// A plan of several seconds; the value is its time, the hash its own. `meanwhile` is called
+// over and over until the run has ended.
+Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder, const std::function<Result<void>(ChildProcess&)>& meanwhile) {
   const fs::path result = folder / "result.json";
   auto run_result = ChildProcess::start(program_folder() / "jostle_run",
                                         {(folder / "scene.yaml").string(), "--plan-only", "--seed", "7", "--headless", "--parameters",
@@ -258,7 +271,10 @@ Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder) {
                                          std::to_string(options.domain)},
                                         folder / "run.log");
   if (!run_result) return run_result.error();
-  const std::string ended = run_result->wait();
+  while (!run_result->ended()) {
+    if (auto ok = meanwhile(*run_result); !ok) return ok.error();
+  }
+  const std::string ended = *run_result->ended();
   if (ended != "exit code 0" && ended != "exit code 1") {  // 1: no plan is good enough, by intent
     return Error{Code::kUnavailable, "the run: " + ended + "\n" + run_result->last_words()};
   }
@@ -271,20 +287,26 @@ Result<void> disturbance(const RecordBenchOptions& options, const fs::path& fold
   auto scene_result = clutter(5);
   if (!scene_result) return scene_result.error();
   if (auto ok = write_text(folder / "scene.yaml", physics_pool::to_yaml(*scene_result)); !ok) return ok;
-  if (auto ok = write_text(folder / "parameters.yaml", "objective: {success_cost: 1.0e-9}\ncontrol: {many_iterations: 12}\n"); !ok) {
+  if (auto ok = write_text(folder / "parameters.yaml", "objective: {success_cost: 1.0e-9}\ncontrol: {many_iterations: 4}\n"); !ok) {
     return ok;
   }
-  const auto recorded = [&]() -> Result<Sample> {
+  // Comes in the middle, is stopped, and comes again: the middleware of everybody finds and
+  // forgets it each time.
+  const auto visit = [&](ChildProcess& run) -> Result<void> {
     const fs::path bag = folder / "bag";
     fs::remove_all(bag);
     auto recorder_result = start_recorder(bag, options.domain);
     if (!recorder_result) return recorder_result.error();
-    auto sample_result = plan(options, folder);
-    if (auto ok = stop_recorder(*recorder_result); !ok) return ok.error();
-    return sample_result;
+    run.wait_for(kVisit);
+    return stop_recorder(*recorder_result);
   };
-  auto result = compare({"plan, recorded", recorded}, {"plan alone", [&] { return plan(options, folder); }},
-                        {.repeats = options.pairs, .stop = options.stop});
+  const auto alone = [&](ChildProcess& run) -> Result<void> {
+    run.wait_for(kVisit);
+    return {};
+  };
+  auto result = compare({"plan, recorded", [&] { return plan(options, folder, visit); }},
+                        {"plan alone", [&] { return plan(options, folder, alone); }},
+                        {.repeats = options.pairs, .stop = options.stop, .cpu_seconds = children_cpu_seconds});
   if (!result) return result.error();
   result->name = "record-disturbance";
   result->unit = "s";

@@ -21,7 +21,8 @@ struct RecordBenchOptions {
 /// A publisher process at a rate, a recorder process, and everything counted three times: by
 /// the publisher, by the recorder's counters, and by the numbers in what the bag holds. Beside
 /// it loops that append the same messages to a bag, and to a bare file, as fast as they can.
-/// Or, with `pairs`, the times of a plan with and without a recorder, in turns.
+/// Or, with `pairs`, the times of a plan with a recorder that is started, stopped and started
+/// again beside it, and without, in turns.
 /// Errors   kUnavailable, kIo; kCancelled. Lost messages are a result, not an error.
 Result<void> bench_record(const RecordBenchOptions& options);
 

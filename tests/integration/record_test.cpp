@@ -1,13 +1,17 @@
 // jostle record as a user starts it, beside publishers of this test: nothing is lost, and what
 // is lost is counted.
 
+#include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <gmock/gmock.h>
+#include <sched.h>
+#include <sys/mount.h>
 #include <sys/resource.h>
 
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "services/bag/folder_reader.hpp"
+#include "services/dds/core.hpp"
 #include "services/dds/names.hpp"
 #include "services/dds/raw.hpp"
 #include "services/dds/topics.hpp"
@@ -102,9 +106,9 @@ class Record : public RunFixture {
   std::unique_ptr<ProgramProcess> recorder;
 };
 
-std::vector<std::string> numbers(int from, int to) {
+std::vector<std::string> numbers(int from, int to, std::size_t size = 7) {
   std::vector<std::string> texts;
-  for (int i = from; i < to; ++i) texts.push_back(text(i));
+  for (int i = from; i < to; ++i) texts.push_back(text(i, size));
   return texts;
 }
 
@@ -196,6 +200,26 @@ TEST_F(Record, NamesTypesItDoesNotKnowAndLeavesThemOut) {
   ASSERT_TRUE(known.was_received());
   ASSERT_EQ(stop_recorder(), 0);
   EXPECT_THAT(topics_of(bag()), ElementsAre("/y"));
+}
+
+TEST_F(Record, NamesTopicsWhoseWriterOffersWhatNobodyTakes) {
+  record({"/x", "/y"});
+  const auto participant = dds::Participant::open({.domain = domain}).value();
+  const std::string type = *dds::wire_type("sensor_msgs/msg/JointState");
+  const dds::RawWriter registers(participant, {"rt/z", type, kDeep});
+  auto& core = participant.core();
+  auto* topic = core.participant->create_topic("rt/x", type, eprosima::fastdds::dds::TOPIC_QOS_DEFAULT);
+  ASSERT_TRUE(topic);
+  eprosima::fastdds::dds::DataWriterQos exclusive;
+  exclusive.ownership().kind = eprosima::fastdds::dds::EXCLUSIVE_OWNERSHIP_QOS;
+  ASSERT_TRUE(core.publisher->create_datawriter(topic, exclusive));
+  const dds::RawWriter plain_one(participant, {"rt/y", type, kDeep});  // announced after it
+  ASSERT_TRUE(plain_one.wait_for_readers(in(kPatience)));
+
+  ASSERT_EQ(stop_recorder(), 0);
+
+  EXPECT_THAT(recorder->err(), HasSubstr("/x: it has a writer and none of its messages came"));
+  EXPECT_THAT(recorder->err(), Not(HasSubstr("/y: it has a writer")));
 }
 
 TEST_F(Record, RingIsWrittenWhenASignalOrAMessageSaysSo) {
@@ -313,6 +337,56 @@ TEST_F(Record, FullDiskEndsItCleanlyWithWhatFits) {
   const int lost = summary()["lost"]["/x"], kept = summary()["messages"]["/x"];
   EXPECT_GE(recovered.size(), static_cast<std::size_t>(kept));
   EXPECT_GT(lost, 0);
+}
+
+// Runs on a disk of so many bytes, mounted at `place` for the thread it runs on and what that
+// starts. False where this user may not mount.
+bool on_a_small_disk(const std::filesystem::path& place, int bytes, const std::function<void()>& act) {
+  bool mounted = false;
+  std::thread([&] {
+    std::filesystem::create_directories(place);
+    const std::string size = fmt::format("size={}", bytes);
+    mounted = unshare(CLONE_FS | CLONE_NEWNS) == 0 && mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+              mount("tmpfs", place.c_str(), "tmpfs", 0, size.c_str()) == 0;
+    if (mounted) act();
+  }).join();
+  return mounted;
+}
+
+TEST_F(Record, DiskThatFillsUpEndsItCleanlyWithWhatFits) {
+  const bool ran = on_a_small_disk(folder.path() / "disk", 6'000'000, [&] {
+    record({"/x", "--no-compress", "-o", folder.path() / "disk" / "bag"});
+    Publisher x(domain, "/x", kDeep);
+    ASSERT_TRUE(x.is_heard());
+    ASSERT_TRUE(soon(kPatience, [&] { return x.write(100, 1003), recorder->code().has_value(); })) << recorder->err();
+
+    EXPECT_EQ(recorder->code(), 3);
+    EXPECT_THAT(recorder->err(), HasSubstr("No space left"));
+    const auto recovered = texts_of(messages_of("/x", folder.path() / "disk" / "bag", true));
+    EXPECT_GE(recovered.size(), summary()["messages"]["/x"].get<std::size_t>());
+    EXPECT_EQ(recovered, numbers(0, static_cast<int>(recovered.size()), 1003));
+    EXPECT_GT(recovered.size(), 1000u);
+  });
+  if (!ran) GTEST_SKIP() << "needs root";
+}
+
+TEST_F(Record, EndsBeforeTheDiskIsFullAndNothingItTookIsLost) {
+  const bool ran = on_a_small_disk(folder.path() / "disk", 24'000'000, [&] {
+    recorder = program("jostle_record", {"/x", "--no-compress", "--min-free", "12MB", "--json", folder.path() / "record.json", "-o",
+                                         folder.path() / "disk" / "bag"});
+    ASSERT_TRUE(recorder->says("ready", kPatience)) << recorder->err();
+    Publisher x(domain, "/x", kDeep);
+    ASSERT_TRUE(x.is_heard());
+    ASSERT_TRUE(soon(kPatience, [&] { return x.write(50, 1003), recorder->code().has_value(); })) << recorder->err();
+
+    EXPECT_EQ(recorder->code(), 3);
+    EXPECT_THAT(recorder->err(), HasSubstr("--min-free"));
+    const auto texts = texts_of(messages_of("/x", folder.path() / "disk" / "bag"));
+    EXPECT_EQ(texts, numbers(0, static_cast<int>(texts.size()), 1003));
+    EXPECT_EQ(summary()["messages"]["/x"], texts.size());
+    EXPECT_EQ(summary()["lost"]["/x"], 0);
+  });
+  if (!ran) GTEST_SKIP() << "needs root";
 }
 
 TEST_F(Record, RefusesToStartWithLessFreeDiskThanAskedFor) {

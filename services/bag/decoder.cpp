@@ -109,8 +109,9 @@ struct Decoder::Types {
         types[part].fields.push_back(std::move(*field_result));
       }
     }
-    std::vector<int> states(types.size(), 0);
-    return check_ends(type, 0, states);
+    std::vector<int> depths(types.size(), 0);
+    if (auto depth_result = depth_of(type, 0, 1, depths); !depth_result) return depth_result.error();
+    return {};
   }
 
   Result<Field> parse_field(const std::string& whole, const std::string& owner, std::string type,
@@ -153,18 +154,28 @@ struct Decoder::Types {
     return field;
   }
 
-  // A type that contains itself would have no end.
-  Result<void> check_ends(const std::string& whole, std::size_t type, std::vector<int>& states) const {
-    states[type] = 1;
-    for (const Field& field : types[type].fields) {
-      if (field.basic != Basic::kMessage || states[field.message] == 2) continue;
-      if (states[field.message] == 1) {
-        return malformed(whole, 1, fmt::format("{} contains itself", types[field.message].name));
-      }
-      if (auto ok = check_ends(whole, field.message, states); !ok) return ok;
+  // How many types deep a type nests, known ones in `depths`. One that contains itself would have
+  // no end, and decoding calls itself for each.
+  Result<int> depth_of(const std::string& whole, std::size_t type, int level, std::vector<int>& depths) const {
+    constexpr int kDeepest = 100, kUnknown = 0, kUnderWay = -1;
+    if (level > kDeepest) {
+      return malformed(whole, 1, fmt::format("got types nested {} deep, wanted at most {}", level, kDeepest));
     }
-    states[type] = 2;
-    return {};
+    depths[type] = kUnderWay;
+    int depth = 0;
+    for (const Field& field : types[type].fields) {
+      if (field.basic != Basic::kMessage) continue;
+      int& known = depths[field.message];
+      if (known == kUnderWay) return malformed(whole, 1, fmt::format("{} contains itself", types[field.message].name));
+      if (known == kUnknown) {
+        if (auto depth_result = depth_of(whole, field.message, level + 1, depths); !depth_result) return depth_result;
+      }
+      depth = std::max(depth, known);
+    }
+    if (level + depth > kDeepest) {
+      return malformed(whole, 1, fmt::format("got types nested {} deep, wanted at most {}", level + depth, kDeepest));
+    }
+    return depths[type] = depth + 1;
   }
 };
 

@@ -170,6 +170,9 @@ TEST(DecoderTest, RefusesMalformedDefinitions) {
   EXPECT_THAT(error("Other x"), HasSubstr("got type a/Other"));
   EXPECT_THAT(error("B[] x"), HasSubstr("contains itself"));
   EXPECT_THAT(error("wstring x"), HasSubstr("wstring"));
+  std::string deep = "T0 x\n";
+  for (int i = 0; i < 5000; ++i) deep += "===\nMSG: a/T" + std::to_string(i) + "\nT" + std::to_string(i + 1) + " x\n";
+  EXPECT_THAT(error(deep + "===\nMSG: a/T5000\nbool x\n"), HasSubstr("nested"));
 }
 
 }  // namespace

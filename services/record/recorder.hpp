@@ -77,7 +77,8 @@ class Recorder {
   };
 
   /// Subscribed when this returns.
-  /// Errors   kInvalidArgument  the folder exists, no topic can be selected, less free disk than min_free
+  /// Errors   kInvalidArgument  the folder exists, less free disk than min_free, a selection without
+  ///                            results for until_result, a domain that is none
   ///          kIo, kUnavailable
   static Result<std::unique_ptr<Recorder>> start(RecordOptions options, Watcher watcher);
   ~Recorder();
@@ -138,7 +139,7 @@ class Recorder {
   bool ring_short_ = false;
   std::map<int, QueuedSample> in_force_;  // by topic: newest of a latched one that left the ring
 
-  std::vector<Tally> tallies_;  // by topic
+  std::deque<Tally> tallies_;  // by topic
   std::uint64_t messages_ = 0;
   std::uint64_t unchecked_ = 0;  // bytes since the disk was looked at
   std::optional<Error> disk_problem_;  // less free than min_free

@@ -25,7 +25,8 @@ struct Benchmark {
   Result<Measurements> (*measure)(const Settings&);
 };
 
-constexpr std::array<Benchmark, 8> kBenchmarks{{
+constexpr auto kBenchmarks = std::to_array<Benchmark>({
+    {"bag", "messages into a bag against bare appends of the same bytes", 7, measure_bag},
     {"pool-threads", "ThreadPool against bare loops of engine steps", 15, measure_pool_threads},
     {"pool-dds", "two worker processes against two bare loops", 15, measure_pool_dds},
     {"round-trip", "an empty task through the pool against a bare Fast DDS echo", 25, measure_round_trip},
@@ -34,7 +35,10 @@ constexpr std::array<Benchmark, 8> kBenchmarks{{
     {"coarse-models", "coarse models against the fine one, per control step", 9, measure_coarse_models},
     {"parareal", "Parareal on all processors against what Eq. 6.4 allows", 15, measure_parareal},
     {"parareal-scheduling", "Parareal on 4 to 32 waiting workers against Eq. 6.4", 9, measure_parareal_scheduling},
-}};
+    {"hosts", "between two hosts: round trip and throughput, protected against unprotected", 9, measure_hosts},
+    {"hosts-scheduling", "waiting workers on several hosts against workers that never idle", 5, measure_hosts_scheduling},
+    {"unplugged", "a plan whose workers' host is unplugged for a while against one left alone", 5, measure_unplugged},
+});
 
 constexpr const char* kCheapPhysics = "cheap-physics";
 constexpr const char* kPool = "pool";
@@ -115,7 +119,8 @@ int main(int argc, char** argv) {
   int worlds = CheapPhysicsOptions{}.executed_worlds;
   std::vector<std::string> parts = CheapPhysicsOptions{}.parts;
   // Of its own, so that neither a user's system nor another benchmark is in the way.
-  Settings settings{.domain = 100 + static_cast<int>(getpid() % 100)};
+  Settings settings{.domain = 100 + static_cast<int>(getpid() % 100),
+                    .on_news = [](const std::string& line) { fmt::print(stderr, "{}\n", line); }};
   app.add_option("name", name, "A benchmark, or `list`")->required();
   app.add_option("--repeats", settings.repeats, "Runs of each side, batches of pool (default: the benchmark's)")
       ->check(CLI::Range(1, 100'000));

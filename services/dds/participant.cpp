@@ -190,7 +190,7 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
   auto qos_result = make_qos(options.name);
   if (!qos_result) return qos_result.error();
   DomainParticipantQos& qos = *qos_result;
-  const std::string way = environment("JOSTLE_DISCOVERY"), identity = environment("JOSTLE_SECURE");
+  const std::string way = environment("JOSTLE_DISCOVERY"), identity = options.identity.value_or(environment("JOSTLE_SECURE"));
   auto discovery_result = parse_discovery(way.empty() || server ? "multicast" : way);
   if (!discovery_result) return discovery_result.error();
   find_by(*discovery_result, qos);

@@ -29,6 +29,7 @@ struct ParticipantOptions {
   std::string name = "jostle";  ///< as tools list it
   std::optional<int> domain;    ///< 0 to 232; else ROS_DOMAIN_ID, else 0
   std::shared_ptr<EndpointWatch> watch;  ///< hears of all others from the first moment; may be empty
+  std::optional<std::string> identity;  ///< folder; empty: unprotected; else JOSTLE_SECURE
 };
 
 /// A discovery server: listens there, introduces participants to each other.

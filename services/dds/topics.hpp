@@ -35,11 +35,16 @@ inline const Topic<msg::WorldDescription> kPoolWorld{"rt/pool/world", dds::kCata
 inline const Topic<msg::BatchControl> kPoolControl{"rt/pool/control", dds::kTask};
 inline const Topic<msg::TaskResult> kPoolResult{"rt/pool/result", dds::kTask};
 
+/// Of bags that are played; the clock shows the bag's time.
+inline const Topic<msg::PlayControl> kPlayControl{"rt/play/control", dds::kCommand};
+inline const Topic<msg::PlayStatus> kPlayStatus{"rt/play/status", dds::kLatched};
+inline const Topic<rosgraph_msgs::msg::Clock> kClock{"rt/clock", dds::kState};
+
 /// All of the above, in their order.
 inline auto all() {
   return std::tie(kJointStates, kTransforms, kObjectPoses, kObjectStates, kRobotCommand, kRobotStatus, kTaskGoal, kTaskCancel,
                   kTaskRun, kTaskObservation, kTaskPlan, kTaskFeedback, kTaskResult, kPoolWorker, kPoolWorld, kPoolControl,
-                  kPoolResult);
+                  kPoolResult, kPlayControl, kPlayStatus, kClock);
 }
 
 /// Each worker reads its own: one sample per task on a shared topic would reach

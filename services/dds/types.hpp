@@ -4,6 +4,7 @@
 
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
+#include "idl/msg/playPubSubTypes.h"
 #include "idl/msg/poolPubSubTypes.h"
 #include "idl/msg/robotPubSubTypes.h"
 #include "idl/msg/rosPubSubTypes.h"
@@ -22,6 +23,7 @@ struct SerializerOf;
   };
 
 JOSTLE_WIRE_TYPE(geometry_msgs, PoseArray)
+JOSTLE_WIRE_TYPE(rosgraph_msgs, Clock)
 JOSTLE_WIRE_TYPE(sensor_msgs, JointState)
 JOSTLE_WIRE_TYPE(tf2_msgs, TFMessage)
 JOSTLE_WIRE_TYPE(jostle_msgs, ObjectStates)
@@ -39,6 +41,8 @@ JOSTLE_WIRE_TYPE(jostle_msgs, WorkerHeartbeat)
 JOSTLE_WIRE_TYPE(jostle_msgs, Task)
 JOSTLE_WIRE_TYPE(jostle_msgs, TaskResult)
 JOSTLE_WIRE_TYPE(jostle_msgs, BatchControl)
+JOSTLE_WIRE_TYPE(jostle_msgs, PlayControl)
+JOSTLE_WIRE_TYPE(jostle_msgs, PlayStatus)
 
 #undef JOSTLE_WIRE_TYPE
 

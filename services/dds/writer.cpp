@@ -92,6 +92,11 @@ bool WriterBase::wait_until_received(TimePoint deadline) const {
   return impl_->writer->wait_for_acknowledgments({static_cast<double>(time.count())}) == ReturnCode_t::RETCODE_OK;
 }
 
+void WriterBase::forget() {
+  std::size_t dropped = 0;
+  impl_->writer->clear_history(&dropped);
+}
+
 bool WriterBase::write_sample(const void* data) {
   // The middleware only reads it; its signature predates const.
   return impl_->writer->write(const_cast<void*>(data));

@@ -43,6 +43,10 @@ class WriterBase {
   /// Whether every reliable reader found so far had everything by the deadline.
   bool wait_until_received(TimePoint deadline) const;
 
+  /// Drops the samples that are kept: a late reader that asks for them gets only what is
+  /// written from now on. A reader that has not received them yet misses them.
+  void forget();
+
  protected:
   bool write_sample(const void* data);
 

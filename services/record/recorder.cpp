@@ -24,6 +24,7 @@ constexpr std::uint64_t kLookAtDisk = 16 << 20;      // bytes written before the
 // the writer, even if the writer has found it.
 const dds::RawTopic kTrigger{"rt/record/trigger", "std_msgs::msg::dds_::Empty_", {.depth = dds::kKeepAll}};
 
+
 bag::Time wall_clock() {
   const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
   return now.count();
@@ -86,10 +87,6 @@ class Recorder::OpenBag {
 };
 
 Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher watcher) {
-  if (options.until_result && !options.selection.wants(*dds::ros_topic(topics::kTaskResult.name))) {
-    return Error{Code::kInvalidArgument, fmt::format("--until-result: got a selection without {}, wanted one with it",
-                                                     *dds::ros_topic(topics::kTaskResult.name))};
-  }
   std::unique_ptr<Recorder> recorder(new Recorder(std::move(options), std::move(watcher)));
   if (auto ok = recorder->check_disk(); !ok) return Error{Code::kInvalidArgument, ok.error().message};
   const RecordOptions& own = recorder->options_;
@@ -102,6 +99,10 @@ Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher
        .on_warning = recorder->watcher_.on_warning});
   if (!subscriptions_result) return subscriptions_result.error();
   recorder->subscriptions_ = std::move(subscriptions_result).value();
+  if (own.until_result && !recorder->hears_results()) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("--until-result: got a selection without {}, wanted one with it", recorder->result_topic())};
+  }
   // Samples wait in the queue meanwhile; and what failed so far has left no folder.
   auto ready = own.ring.count() > 0 ? recorder->await_triggers() : recorder->open_bag();
   if (!ready) return ready.error();
@@ -138,6 +139,18 @@ Recorder::Recorder(RecordOptions options, Watcher watcher)
 Recorder::~Recorder() {
   trigger_reader_.reset();
   if (subscriptions_) subscriptions_->close();  // its threads call on_sample()
+}
+
+// In our namespace: another robot's task is not the one that is waited for.
+std::string Recorder::result_topic() const {
+  return *dds::ros_topic(subscriptions_->participant().wire_name(topics::kTaskResult.name, topics::kTaskResult.scope));
+}
+
+bool Recorder::hears_results() const {
+  for (int topic = 0; topic < topics(); ++topic) {
+    if (subscriptions_->topic(topic).name == result_topic()) return true;
+  }
+  return false;
 }
 
 // On the middleware's threads.
@@ -192,7 +205,7 @@ Recorder::Tally& Recorder::tally_of(int topic) {
   if (!std::exchange(tally.known, true)) {
     const bag::Topic known = subscriptions_->topic(topic);
     tally.latched = known.qos.latched;
-    tally.is_result = known.name == dds::ros_topic(topics::kTaskResult.name);
+    tally.is_result = known.name == result_topic();
   }
   return tally;
 }

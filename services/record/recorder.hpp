@@ -107,6 +107,8 @@ class Recorder {
   Recorder(RecordOptions options, Watcher watcher);
 
   void on_sample(int topic, std::span<const std::byte> data, const dds::Origin& origin);
+  std::string result_topic() const;
+  bool hears_results() const;
   Result<void> open_bag();
   Result<void> await_triggers();
   std::filesystem::path next_snapshot() const;

@@ -132,6 +132,8 @@ class FolderReader final : public CheckedReader {
   std::vector<std::string> damage() const override {
     std::vector<std::string> all = damage_;
     for (const File& file : files_) std::ranges::copy(file.reader->info().damage, std::back_inserter(all));
+    // Who asks is doing what the remedy says.
+    for (std::string& where : all) where.resize(std::min(where.find("; remedy: "), where.size()));
     return all;
   }
 

@@ -68,7 +68,10 @@ class McapReader final : public FileReader {
     auto read = open_whole();
     if (options_.recover) {
       // What a whole summary says of channels outlives the chunks that say it, too.
-      if (!read) forget();
+      if (!read) {
+        forget();
+        info_.damage.push_back(read.error().message);
+      }
       blocks_.clear();
       recovers_ = true;
       read = scan(file_.size());

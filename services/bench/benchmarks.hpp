@@ -3,7 +3,9 @@
 /// Everything that can be measured. docs/benchmarks.md says why.
 
 #include <chrono>
+#include <functional>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "services/bench/measurement.hpp"
@@ -14,8 +16,9 @@ namespace jostle::services {
 struct Settings {
   int repeats = 0;           ///< >= 1
   std::vector<int> workers;  ///< of `scheduling`: processes, one measurement each
-  int domain = 0;            ///< DDS domain that nobody else uses
+  int domain = 0;            ///< DDS domain that nobody else uses, nor the next one
   std::stop_token stop;
+  std::function<void(const std::string& line)> on_news;  ///< while it takes long; never empty
 };
 
 using Measurements = std::vector<Measurement>;
@@ -40,6 +43,17 @@ Result<Measurements> measure_early_stop(const Settings& settings);
 /// takes when nobody idles, against the time the batch took.
 Result<Measurements> measure_scheduling(const Settings& settings);
 
+/// The same with the workers spread over hosts.
+Result<Measurements> measure_hosts_scheduling(const Settings& settings);
+
+/// Round trips and throughput between two hosts over a good and a bad link, through a
+/// protected and an unprotected domain, microseconds and MB/s.
+Result<Measurements> measure_hosts(const Settings& settings);
+
+/// A plan while a host of workers is unplugged for a while, against the same plan left
+/// alone, seconds.
+Result<Measurements> measure_unplugged(const Settings& settings);
+
 /// One step of 1 s of every coarse model against one of the fine model, microseconds.
 /// The sides answer the same question, not alike.
 Result<Measurements> measure_coarse_models(const Settings& settings);
@@ -51,6 +65,9 @@ Result<Measurements> measure_parareal(const Settings& settings);
 /// The same over N worker processes that wait as long as a slice takes: what the
 /// exchange of slices costs, beyond Eq. 6.4, where there are processors enough.
 Result<Measurements> measure_parareal_scheduling(const Settings& settings);
+
+/// Messages of 1 KiB into a bag of each kind against bare appends of the same bytes, messages/s.
+Result<Measurements> measure_bag(const Settings& settings);
 
 /// The other process of `round-trip`: answers every task until it is told to
 /// end. Returns the exit code.

@@ -10,6 +10,7 @@
 #include "services/bench/benchmarks.hpp"
 #include "services/bench/cheap_physics.hpp"
 #include "services/bench/pool_timeline.hpp"
+#include "services/bench/record.hpp"
 #include "services/support/cores.hpp"
 #include "services/support/files.hpp"
 #include "services/support/program.hpp"
@@ -24,7 +25,8 @@ struct Benchmark {
   Result<Measurements> (*measure)(const Settings&);
 };
 
-constexpr std::array<Benchmark, 8> kBenchmarks{{
+constexpr auto kBenchmarks = std::to_array<Benchmark>({
+    {"bag", "messages into a bag against bare appends of the same bytes", 7, measure_bag},
     {"pool-threads", "ThreadPool against bare loops of engine steps", 15, measure_pool_threads},
     {"pool-dds", "two worker processes against two bare loops", 15, measure_pool_dds},
     {"round-trip", "an empty task through the pool against a bare Fast DDS echo", 25, measure_round_trip},
@@ -33,14 +35,19 @@ constexpr std::array<Benchmark, 8> kBenchmarks{{
     {"coarse-models", "coarse models against the fine one, per control step", 9, measure_coarse_models},
     {"parareal", "Parareal on all processors against what Eq. 6.4 allows", 15, measure_parareal},
     {"parareal-scheduling", "Parareal on 4 to 32 waiting workers against Eq. 6.4", 9, measure_parareal_scheduling},
-}};
+    {"hosts", "between two hosts: round trip and throughput, protected against unprotected", 9, measure_hosts},
+    {"hosts-scheduling", "waiting workers on several hosts against workers that never idle", 5, measure_hosts_scheduling},
+    {"unplugged", "a plan whose workers' host is unplugged for a while against one left alone", 5, measure_unplugged},
+});
 
 constexpr const char* kCheapPhysics = "cheap-physics";
 constexpr const char* kPool = "pool";
+constexpr const char* kRecord = "record";
 
 int list() {
   fmt::print("{:<20} {}\n", kCheapPhysics, "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers");
   fmt::print("{:<20} {}\n", kPool, "what each worker did when: busy shares, gaps, a picture");
+  fmt::print("{:<20} {}\n", kRecord, "the recorder at 20,000 messages per second, or what it costs a plan");
   for (const Benchmark& benchmark : kBenchmarks) fmt::print("{:<20} {}\n", benchmark.name, benchmark.purpose);
   return kExitOk;
 }
@@ -85,6 +92,12 @@ int show_pool(const Settings& settings, PoolTimelineOptions options) {
   return ok ? kExitOk : fail(ok.error(), ok.error().code == Code::kInvalidArgument ? kExitUsage : kExitBroken);
 }
 
+int record(const Settings& settings, RecordBenchOptions options, bool disturbance) {
+  if (disturbance) options.pairs = settings.repeats > 0 ? settings.repeats : 9;
+  const auto ok = bench_record(options);
+  return ok ? kExitOk : fail(ok.error(), kExitBroken);
+}
+
 int start(const std::string& name, const Settings& settings, const std::string& json) {
   if (name == "list") return list();
   if (name == "echo") return serve_echo(settings.domain, settings.stop);
@@ -106,7 +119,8 @@ int main(int argc, char** argv) {
   int worlds = CheapPhysicsOptions{}.executed_worlds;
   std::vector<std::string> parts = CheapPhysicsOptions{}.parts;
   // Of its own, so that neither a user's system nor another benchmark is in the way.
-  Settings settings{.domain = 100 + static_cast<int>(getpid() % 100)};
+  Settings settings{.domain = 100 + static_cast<int>(getpid() % 100),
+                    .on_news = [](const std::string& line) { fmt::print(stderr, "{}\n", line); }};
   app.add_option("name", name, "A benchmark, or `list`")->required();
   app.add_option("--repeats", settings.repeats, "Runs of each side, batches of pool (default: the benchmark's)")
       ->check(CLI::Range(1, 100'000));
@@ -125,6 +139,11 @@ int main(int argc, char** argv) {
       ->capture_default_str()->check(CLI::Range(1, 8));
   app.add_flag("--urgent", timeline.urgent, "Of pool: the last client's batches are urgent");
   app.add_flag("--pin", pin, "Of pool: give each worker a core of its own, in turn");
+  RecordBenchOptions recording;
+  bool disturbance = false;
+  app.add_option("--rate", recording.rate, "Of record: messages of 1 KiB per second")->capture_default_str()->check(CLI::Range(1.0, 1e6));
+  app.add_option("--seconds", recording.seconds, "Of record: how long")->capture_default_str()->check(CLI::Range(0.1, 86400.0));
+  app.add_flag("--disturbance", disturbance, "Of record: the time of a plan with and without a recorder instead");
   add_network_options(app);
   app.add_option("--domain", settings.domain, "DDS domain (default: one of 100 to 199, from the process id)")
       ->check(CLI::Range(0, 232));
@@ -139,6 +158,15 @@ int main(int argc, char** argv) {
       timeline.json = json;
       if (pin) timeline.cores = allowed_cores();
       return show_pool(settings, timeline);
+    }
+    recording.json = json;
+    recording.domain = settings.domain;
+    recording.stop = settings.stop;
+    if (name == kRecord) return record(settings, recording, disturbance);
+    if (name == "publish") return publish_for_record(recording);
+    if (app.count("--rate") + app.count("--seconds") + app.count("--disturbance") > 0) {
+      fmt::print(stderr, "jostle bench: --rate, --seconds, --disturbance: got '{}', wanted {}\n", name, kRecord);
+      return kExitUsage;
     }
     if (app.count("--timeline") + app.count("--clients") + app.count("--urgent") + app.count("--pin") > 0) {
       fmt::print(stderr, "jostle bench: --timeline, --clients, --urgent, --pin: got '{}', wanted {}\n", name, kPool);

@@ -92,6 +92,12 @@ Result<Measurement> compare(const Side& a, const Side& b, const Turns& turns) {
   return measurement;
 }
 
+std::string one_line(const Measurement& measurement) {
+  return fmt::format("{}: {} {:.5g} {}, {} {:.5g} {}, ratio {:.3f}", measurement.name, measurement.name_a,
+                     median(measurement.a), measurement.unit, measurement.name_b, median(measurement.b), measurement.unit,
+                     measurement.ratio());
+}
+
 std::string to_text(const Measurement& measurement) {
   const Interval interval = measurement.interval();
   const double ratio = measurement.ratio();

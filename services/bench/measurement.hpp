@@ -67,6 +67,9 @@ struct Turns {
 /// Errors   a side's, or kCancelled between two runs.
 Result<Measurement> compare(const Side& a, const Side& b, const Turns& turns);
 
+/// For people who wait for the next one.
+std::string one_line(const Measurement& measurement);
+
 /// For people: a few lines.
 std::string to_text(const Measurement& measurement);
 

@@ -1,122 +1,64 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
 #include <thread>
 
 #include "idl/convert/pool.hpp"
 #include "services/bench/benchmarks.hpp"
+#include "services/bench/echo.hpp"
+#include "services/bench/several_hosts.hpp"
 #include "services/bench/swarm.hpp"
 #include "services/bench/workload.hpp"
-#include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
 
 namespace msg = jostle_msgs::msg;
 using Clock = std::chrono::steady_clock;
-using physics_pool::End;
 using physics_pool::RolloutBatch;
 using physics_pool::RolloutOutcome;
 
-constexpr int kTrips = 100;                  // in one run of one side
-constexpr std::chrono::seconds kLost{10};    // a reliable message on one machine takes no such time
-constexpr std::chrono::seconds kMeeting{15}; // until both processes know each other
-constexpr std::chrono::milliseconds kGreeting{100};
-
-// Type and promise of the pool's own, and nobody else's name.
-const dds::Topic<msg::Task> kPing{"rt/bench/ping", dds::kTask};
-const dds::Topic<msg::TaskResult> kPong{"rt/bench/pong", dds::kTask};
-
-// What a worker answers to an empty sample.
-RolloutOutcome empty_outcome(std::uint32_t sample) {
-  return {.sample = sample, .end = End::kCompleted, .cost = 0.0};
-}
-
-double micros_since(Clock::time_point start) { return 1e6 * seconds_since(start); }
-
-// Round trips of one side: the median of each run, and all of them together.
-struct Trips {
-  std::vector<double> all;  // microseconds
+// One run of each side: so many round trips.
+Result<Sample> through_pool(RemotePool& pool, const RolloutBatch& batch, int count, Trips& trips) {
   std::vector<RolloutOutcome> answers;
-
-  Sample finish() {
-    const std::vector<double> newest(all.end() - kTrips, all.end());
-    return {.value = median(newest), .hash = hash_of_answers(std::exchange(answers, {}))};
-  }
-};
-
-Result<Sample> through_pool(RemotePool& pool, const RolloutBatch& batch, Trips& trips) {
-  for (int i = 0; i < kTrips; ++i) {
+  for (int i = 0; i < count; ++i) {
     const auto start = Clock::now();
     auto reply_result = pool.run(batch, start + kLost);
-    trips.all.push_back(micros_since(start));
+    trips.add(start);
     if (!reply_result) return reply_result.error();
-    trips.answers.push_back(std::move(reply_result->outcomes.front()));
+    answers.push_back(std::move(reply_result->outcomes.front()));
   }
-  return trips.finish();
+  return trips.finish(hash_of_answers(answers));
 }
 
-// This process's end of the echo.
-struct Bare {
-  dds::Writer<msg::Task> ping;
-  dds::Inbox<msg::TaskResult> pong;
-  std::uint64_t epoch = 0;  // of greetings
-
-  explicit Bare(const dds::Participant& participant) : ping(participant, kPing), pong(participant, kPong, 8) {}
-
-  // Pings until an answer comes: only that shows that both directions work.
-  Result<void> meet(const msg::Task& task, Helpers& helpers) {
-    const auto deadline = Clock::now() + kMeeting;
-    do {
-      ping.write(task);
-      if (pong.take(Clock::now() + kGreeting)) return {};
-    } while (Clock::now() < deadline);
-    return Error{Code::kUnavailable, fmt::format("echo: no answer in {} s {}", kMeeting.count(), helpers.casualty())};
+Result<Sample> through_echo(Echo& echo, msg::Task task, int count, Trips& trips) {
+  std::vector<RolloutOutcome> answers;
+  for (int i = 0; i < count; ++i) {
+    const auto start = Clock::now();
+    auto answer_result = echo.ask(task);
+    trips.add(start);
+    if (!answer_result) return answer_result.error();
+    auto outcome_result = convert::from_wire(*answer_result);
+    if (!outcome_result) return outcome_result.error();
+    answers.push_back(std::move(outcome_result).value());
   }
+  return trips.finish(hash_of_answers(answers));
+}
 
-  // Answers to greetings may come late; they are not meant.
-  std::optional<msg::TaskResult> answer_to(const msg::Task& task, Clock::time_point deadline) {
-    auto answer = pong.take(deadline);
-    while (answer && answer->epoch() != task.epoch()) answer = pong.take(deadline);
-    return answer;
-  }
-
-  Result<Sample> echo(msg::Task task, Trips& trips) {
-    for (int i = 0; i < kTrips; ++i) {
-      task.epoch(++epoch);
-      const auto start = Clock::now();
-      ping.write(task);
-      const auto answer = answer_to(task, start + kLost);
-      trips.all.push_back(micros_since(start));
-      if (!answer) return Error{Code::kUnavailable, fmt::format("echo: no answer to ping {}", task.epoch())};
-      auto outcome_result = convert::from_wire(*answer);
-      if (!outcome_result) return outcome_result.error();
-      trips.answers.push_back(std::move(outcome_result).value());
-    }
-    return trips.finish();
-  }
-};
-
-// The message that the pool sends for such a batch.
-msg::Task task_of(const RolloutBatch& batch) {
-  msg::Task task;
-  task.batch(convert::to_wire(batch));
-  task.best_cost(physics_pool::kInfinity);
-  task.first_success(UINT32_MAX);
-  task.samples({batch.first_sample});
-  return task;
+RolloutBatch empty_batch(const physics_pool::Scene& scene) {
+  RolloutBatch batch = push(scene, 3, 0.5, 1);
+  batch.wait = std::chrono::nanoseconds(0);
+  return batch;
 }
 
 }  // namespace
 
 Result<Measurements> measure_round_trip(const Settings& settings) {
+  constexpr int kTrips = 100;
   auto scene_result = clutter(5);
   if (!scene_result) return scene_result.error();
-  RolloutBatch batch = push(*scene_result, 3, 0.5, 1);
-  batch.wait = std::chrono::nanoseconds(0);
+  const RolloutBatch batch = empty_batch(*scene_result);
 
   // Where the kernel puts the other process decides more than anything measured
   // here (45 us on the same core, 95 us on another) and stays for minutes: both
@@ -127,40 +69,161 @@ Result<Measurements> measure_round_trip(const Settings& settings) {
   if (!swarm_result) return swarm_result.error();
   Swarm& swarm = **swarm_result;
   if (auto loaded = swarm.pool().load(*scene_result); !loaded) return loaded.error();
-  Bare bare(swarm.participant());
+  Echo echo(swarm.participant());
   if (auto ok = swarm.helpers().start("jostle_bench", {"echo"}); !ok) return ok.error();
-  if (auto ok = bare.meet(task_of(batch), swarm.helpers()); !ok) return ok.error();
+  if (auto ok = echo.meet(task_of(batch), swarm.helpers()); !ok) return ok.error();
 
   Trips pool_trips, bare_trips;
-  auto result = compare({"pool over DDS", [&] { return through_pool(swarm.pool(), batch, pool_trips); }},
-                        {"bare echo", [&] { return bare.echo(task_of(batch), bare_trips); }},
+  auto result = compare({"pool over DDS", [&] { return through_pool(swarm.pool(), batch, kTrips, pool_trips); }},
+                        {"bare echo", [&] { return through_echo(echo, task_of(batch), kTrips, bare_trips); }},
                         swarm.turns(settings.repeats, settings.stop));
   if (!result) return result.error();
   result->name = "round-trip";
   result->unit = "us";
   result->aim = Aim{Aim::Kind::kAtMost, 1.5};
   result->details = {{"trips", settings.repeats * kTrips},
-                     {"p99_a", quantile(pool_trips.all, 0.99)},
-                     {"p99_b", quantile(bare_trips.all, 0.99)}};
+                     {"p99_a", quantile(pool_trips.all(), 0.99)},
+                     {"p99_b", quantile(bare_trips.all(), 0.99)}};
   return Measurements{*std::move(result)};
 }
 
-int serve_echo(int domain, std::stop_token stop) {
-  die_with_parent(getppid());
-  auto participant_result = dds::Participant::open({.name = "jostle_bench_echo", .domain = domain});
-  if (!participant_result) {
-    fmt::print(stderr, "jostle bench: {}\n", participant_result.error().message);
-    return kExitBroken;
+namespace {
+
+constexpr std::size_t kKilo = 1024;
+constexpr std::size_t kPayloads[] = {kKilo, 64 * kKilo, 1024 * kKilo};  // bytes
+constexpr int kWindow = 64;  // messages of a stream that are under way
+
+// A protected and an unprotected domain over the same hosts: a client here, a worker and an
+// echo on host 2 each.
+struct Domain {
+  std::unique_ptr<Swarm> swarm;
+  std::unique_ptr<Echo> echo;
+  Trips trips;
+
+  static Result<Domain> open(const Settings& settings, const physics_pool::Scene& scene, const Hosts& hosts,
+                             const std::filesystem::path& keystore) {
+    const int domain = settings.domain + (keystore.empty() ? 0 : 1);
+    auto swarm_result = Swarm::start({.domain = domain, .hosts = &hosts, .keystore = keystore, .stop = settings.stop});
+    if (!swarm_result) return swarm_result.error();
+    Domain opened{.swarm = std::move(swarm_result).value(), .echo = {}, .trips = {}};
+    if (auto loaded = opened.swarm->pool().load(scene); !loaded) return loaded.error();
+    opened.echo = std::make_unique<Echo>(opened.swarm->participant());
+    std::vector<std::string> arguments{"echo"};
+    if (!keystore.empty()) arguments.insert(arguments.end(), {"--secure", keystore / "identities" / "robot"});
+    Helpers& helpers = opened.swarm->helpers();
+    if (auto ok = helpers.start("jostle_bench", arguments, {.hosts = &hosts, .host = 2}); !ok) return ok.error();
+    if (auto ok = opened.echo->meet(task_of(empty_batch(scene)), helpers); !ok) return ok.error();
+    return opened;
   }
-  dds::Writer<msg::TaskResult> pong(*participant_result, kPong);
-  const dds::Reader<msg::Task> ping(*participant_result, kPing, [&](const msg::Task& task) {
-    msg::TaskResult result = convert::to_wire(empty_outcome(task.samples().front()));
-    result.client(task.client());
-    result.epoch(task.epoch());
-    pong.write(result);
-  });
-  wait_for(std::move(stop));
-  return kExitOk;
+};
+
+// Controls of so many bytes; nobody executes them.
+msg::Task task_of_size(const physics_pool::Scene& scene, std::size_t bytes, bool both_ways) {
+  msg::Task task = task_of(empty_batch(scene));
+  task.batch().nominal().assign(bytes / sizeof(double), 0.5);
+  task.batch().want_all_trajectories(both_ways);
+  return task;
+}
+
+Result<Sample> there_and_back(Domain& domain, msg::Task task, int count) {
+  Hash hash;
+  for (int i = 0; i < count; ++i) {
+    const auto start = Clock::now();
+    auto answer_result = domain.echo->ask(task);
+    domain.trips.add(start);
+    if (!answer_result) return answer_result.error();
+    hash = hash_of(answer_result->trajectory());
+  }
+  return domain.trips.finish(hash);
+}
+
+// In megabytes per second, there.
+Result<Sample> flood(Domain& domain, msg::Task task, int count) {
+  const auto start = Clock::now();
+  if (auto ok = domain.echo->stream(task, count, kWindow); !ok) return ok.error();
+  const double bytes = static_cast<double>(task.batch().nominal().size() * sizeof(double)) * count;
+  return Sample{.value = 1e-6 * bytes / seconds_since(start), .hash = hash_of(task.batch().nominal())};
+}
+
+std::string size_name(std::size_t bytes) { return fmt::format("{}KiB", bytes / kKilo); }
+
+// What one link does to the pool's and the middleware's messages, with and without protection.
+class Link {
+ public:
+  Link(std::string name, const LinkQuality& quality, const Settings& settings)
+      : name_(std::move(name)), quality_(quality), settings_(settings) {}
+
+  Result<Measurements> measure(const Hosts& hosts) {
+    auto scene_result = clutter(5);
+    if (!scene_result) return scene_result.error();
+    auto keys_result = TemporaryKeystore::make();
+    if (!keys_result) return keys_result.error();
+    auto protected_result = Domain::open(settings_, *scene_result, hosts, keys_result->folder());
+    if (!protected_result) return protected_result.error();
+    auto plain_result = Domain::open(settings_, *scene_result, hosts, {});
+    if (!plain_result) return plain_result.error();
+
+    const RolloutBatch batch = empty_batch(*scene_result);
+    const auto pool = [&](Domain& domain) { return through_pool(domain.swarm->pool(), batch, trips(0), domain.trips); };
+    if (auto ok = add("round-trip/pool", "us", *protected_result, *plain_result, pool); !ok) return ok.error();
+    for (const std::size_t bytes : kPayloads) {
+      const msg::Task task = task_of_size(*scene_result, bytes, true);
+      const auto ask = [&](Domain& domain) { return there_and_back(domain, task, trips(bytes)); };
+      if (auto ok = add("round-trip/" + size_name(bytes), "us", *protected_result, *plain_result, ask); !ok) return ok.error();
+    }
+    for (const std::size_t bytes : kPayloads) {
+      const msg::Task task = task_of_size(*scene_result, bytes, false);
+      const auto send = [&](Domain& domain) { return flood(domain, task, messages(bytes)); };
+      if (auto ok = add("throughput/" + size_name(bytes), "MB/s", *protected_result, *plain_result, send); !ok) return ok.error();
+    }
+    return std::move(measurements_);
+  }
+
+ private:
+  // Enough for a run of a good fraction of a second; of seconds where frames are lost, for a
+  // datagram of 64 KiB is 44 of them and mostly has to be repeated.
+  int trips(std::size_t bytes) const {
+    if (quality_.perfect()) return bytes > 64 * kKilo ? 20 : 200;
+    return bytes > 64 * kKilo ? 2 : bytes > kKilo ? 10 : 20;
+  }
+  int messages(std::size_t bytes) const {
+    const std::size_t total = (quality_.perfect() ? 64 : 4) * 1024 * kKilo;
+    return static_cast<int>(std::min<std::size_t>(total / bytes, quality_.perfect() ? 10'000 : 2'000));
+  }
+
+  Result<void> add(const std::string& what, const std::string& unit, Domain& a, Domain& b,
+                   const std::function<Result<Sample>(Domain&)>& run) {
+    a.trips = b.trips = {};
+    auto result = compare({"protected", [&] { return run(a); }}, {"unprotected", [&] { return run(b); }},
+                          {.repeats = settings_.repeats, .stop = settings_.stop});
+    if (!result) return Error{result.error().code, fmt::format("{}/{}: {}", what, name_, result.error().message)};
+    result->name = fmt::format("{}/{}", what, name_);
+    result->unit = unit;
+    if (!a.trips.all().empty()) {
+      result->details = {{"p99_a", quantile(a.trips.all(), 0.99)}, {"p99_b", quantile(b.trips.all(), 0.99)}};
+    }
+    settings_.on_news(one_line(*result));
+    measurements_.push_back(*std::move(result));
+    return {};
+  }
+
+  const std::string name_;
+  const LinkQuality quality_;
+  const Settings& settings_;
+  Measurements measurements_;
+};
+
+}  // namespace
+
+Result<Measurements> measure_hosts(const Settings& settings) {
+  Measurements all;
+  for (const auto& [name, quality] : {std::pair("good", LinkQuality{}), std::pair("bad", kBadLink)}) {
+    Link link(name, quality, settings);
+    auto result = measure_on_hosts(2, quality, [&](const Hosts& hosts) { return link.measure(hosts); });
+    if (!result) return result.error();
+    all.insert(all.end(), result->begin(), result->end());
+  }
+  return all;
 }
 
 }  // namespace jostle::services

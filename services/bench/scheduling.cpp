@@ -1,6 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdlib>
+
 #include "services/bench/benchmarks.hpp"
+#include "services/bench/several_hosts.hpp"
 #include "services/bench/swarm.hpp"
 #include "services/bench/workload.hpp"
 
@@ -13,6 +17,7 @@ using physics_pool::RolloutOutcome;
 
 constexpr std::chrono::milliseconds kWait{50};
 constexpr int kTasksPerWorker = 10;
+constexpr int kWorkersPerHost = 32;
 
 double milliseconds(double seconds) { return 1e3 * seconds; }
 
@@ -34,14 +39,14 @@ Sample waiting_without_gaps(const RolloutBatch& batch, int workers) {
   return {.value = milliseconds(seconds), .hash = hash_of_answers(outcomes)};
 }
 
-Result<Measurement> measure_with(int workers, const Settings& settings) {
+Result<Measurement> measure_with(int workers, const Settings& settings, const Hosts* hosts = nullptr) {
   auto scene_result = clutter(5);
   if (!scene_result) return scene_result.error();
   RolloutBatch batch = push(*scene_result, 3, 0.5, static_cast<std::uint32_t>(kTasksPerWorker * workers));
   batch.wait = kWait;
 
   const auto start = std::chrono::steady_clock::now();
-  auto swarm_result = Swarm::start({.workers = workers, .domain = settings.domain, .stop = settings.stop});
+  auto swarm_result = Swarm::start({.workers = workers, .domain = settings.domain, .hosts = hosts, .stop = settings.stop});
   if (!swarm_result) return swarm_result.error();
   const double gathering = seconds_since(start);
   RemotePool& pool = (*swarm_result)->pool();
@@ -60,6 +65,27 @@ Result<Measurement> measure_with(int workers, const Settings& settings) {
                      {"gathering_s", gathering},
                      {"reissued", static_cast<double>(status.reissued)},
                      {"duplicates", static_cast<double>(status.duplicates)}};
+  settings.on_news(one_line(*result));
+  return result;
+}
+
+// A host has ports for about a hundred participants of a domain.
+int hosts_for(int workers) { return std::clamp((workers + kWorkersPerHost - 1) / kWorkersPerHost, 2, 8); }
+
+// Workers need not know of each other: a discovery server introduces each to the client
+// alone, where everybody else's way costs exchanges that grow with the square of their number.
+Result<Measurement> measure_across(int workers, const Settings& settings, const Hosts& hosts) {
+  Helpers server(settings.domain, {});
+  const char* way = std::getenv("JOSTLE_DISCOVERY");
+  if (!way) {
+    setenv("JOSTLE_DISCOVERY", fmt::format("server:{}", Hosts::address(1)).c_str(), 1);
+    if (auto ok = server.start("jostle_discovery_server", {}); !ok) return ok.error();
+  }
+  auto result = measure_with(workers, settings, &hosts);
+  if (!way) unsetenv("JOSTLE_DISCOVERY");
+  if (!result) return result.error();
+  result->name = "hosts-" + result->name;
+  result->details.emplace_back("hosts", hosts.count() - 1);
   return result;
 }
 
@@ -71,6 +97,20 @@ Result<Measurements> measure_scheduling(const Settings& settings) {
     auto result = measure_with(workers, settings);
     if (!result) return result.error();
     measurements.push_back(*std::move(result));
+  }
+  return measurements;
+}
+
+Result<Measurements> measure_hosts_scheduling(const Settings& settings) {
+  Measurements measurements;
+  for (const int workers : settings.workers) {
+    auto result = measure_on_hosts(1 + hosts_for(workers), {}, [&](const Hosts& hosts) -> Result<Measurements> {
+      auto one_result = measure_across(workers, settings, hosts);
+      if (!one_result) return one_result.error();
+      return Measurements{*std::move(one_result)};
+    });
+    if (!result) return result.error();
+    measurements.push_back(std::move(result->front()));
   }
   return measurements;
 }

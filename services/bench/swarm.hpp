@@ -14,8 +14,15 @@
 #include "services/bench/measurement.hpp"
 #include "services/pool_remote/remote_pool.hpp"
 #include "services/support/child_process.hpp"
+#include "services/support/hosts.hpp"
 
 namespace jostle::services {
+
+/// Where a process lives.
+struct Place {
+  const Hosts* hosts = nullptr;  ///< null: where the caller lives
+  int host = 1;
+};
 
 /// Programs that lie beside this one, in one DDS domain with it; all of them end
 /// with it, and so does the folder of their logs.
@@ -27,9 +34,14 @@ class Helpers {
   Helpers(const Helpers&) = delete;
   Helpers& operator=(const Helpers&) = delete;
 
-  /// Adds --domain to the arguments.
+  /// Adds --domain to the arguments. They are numbered from 0.
   /// Errors   kNotFound naming the program, kIo naming the folder.
-  Result<void> start(const std::string& program, std::vector<std::string> arguments);
+  Result<void> start(const std::string& program, std::vector<std::string> arguments, const Place& place = {});
+
+  /// Another one of the same in the place of one that was killed.
+  Result<void> replace(std::size_t helper);
+
+  pid_t pid(std::size_t helper) const { return helpers_.at(helper).process.pid(); }
 
   /// One that is gone, with its last words; empty while all are there.
   std::string casualty();
@@ -38,10 +50,21 @@ class Helpers {
   double cpu_seconds() const;
 
  private:
+  struct Helper {
+    std::string program;
+    std::vector<std::string> arguments;
+    Place place;
+    std::filesystem::path log;
+    ChildProcess process;
+  };
+
+  Result<ChildProcess> spawn(const std::string& program, const std::vector<std::string>& arguments, const Place& place,
+                             const std::filesystem::path& log) const;
+
   const int domain_;
   const std::optional<int> core_;
   std::filesystem::path folder_;
-  std::vector<ChildProcess> children_;
+  std::vector<Helper> helpers_;
 };
 
 /// The calling thread, and the threads and processes it starts, run on one core
@@ -62,6 +85,8 @@ struct SwarmOptions {
   int domain = 0;
   std::optional<int> core;  ///< the only one the workers run on, if given
   std::vector<int> cores;   ///< else: dealt to the workers in turn, each pinned to its own; empty: not pinned
+  const Hosts* hosts = nullptr;    ///< workers live on hosts 2, 3, … in turn; null: on this one
+  std::filesystem::path keystore;  ///< of a protected domain: we are its `robot`, they its `worker`; else JOSTLE_SECURE
   RemotePoolOptions pool;
   std::stop_token stop;
 };

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <climits>
 #include <optional>
 #include <sstream>
 #include <vector>
 
+#include "idl/types/number.hpp"
 #include "services/support/files.hpp"
 
 namespace jostle::services {
@@ -37,11 +37,10 @@ Result<std::optional<physics_pool::PararealOptions>> parse(const std::string& te
   constexpr std::string_view kParareal = "parareal:";
   if (method.starts_with(kParareal)) {
     const std::string_view times = std::string_view(method).substr(kParareal.size());
-    const auto [end, problem] = std::from_chars(times.data(), times.data() + times.size(), options.stop.iterations);
+    const auto iterations = parse_whole(times, 1, INT_MAX);
     options.stop.adaptive = times == "adaptive";
-    if (options.stop.adaptive) options.stop.iterations = INT_MAX;
-    const bool is_number = problem == std::errc{} && end == times.data() + times.size() && options.stop.iterations > 0;
-    if (!is_number && !options.stop.adaptive) return unknown(text);
+    if (!iterations && !options.stop.adaptive) return unknown(text);
+    options.stop.iterations = iterations.value_or(INT_MAX);
     if (!words.empty() && words.back() == "split") {
       options.split_by_itself = true;
       words.pop_back();

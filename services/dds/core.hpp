@@ -98,6 +98,13 @@ class Peers {
 /// still on their way.
 inline constexpr int kMostKept = 1 << 16;
 
+/// What a participant of the profile udp or shared_memory is where the file of profiles does not
+/// say; nothing for other names.
+std::optional<eprosima::fastdds::dds::DomainParticipantQos> built_in_participant(const std::string& profile);
+
+/// A writer of this Qos where the file of profiles does not say; `apply` is a reader's.
+void apply_to_writer(const Qos& qos, eprosima::fastdds::dds::DataWriterQos& writer);
+
 /// The part of a Qos that writers and readers write the same way.
 template <class EndpointQos>
 void apply(const Qos& qos, EndpointQos& endpoint) {
@@ -106,9 +113,9 @@ void apply(const Qos& qos, EndpointQos& endpoint) {
   endpoint.durability().kind = qos.latched ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
   endpoint.history().kind = KEEP_LAST_HISTORY_QOS;
   endpoint.history().depth = qos.depth;
-  endpoint.resource_limits().max_samples_per_instance = qos.depth;
+  // No other limit than the depth, so that there is one number to change.
+  endpoint.resource_limits().max_samples = endpoint.resource_limits().max_samples_per_instance = 0;
   endpoint.resource_limits().max_instances = qos.instances;
-  endpoint.resource_limits().max_samples = qos.depth * qos.instances;
   // Room for one sample; the rest is allocated when it is needed.
   endpoint.resource_limits().allocated_samples = 1;
   if (qos.depth == kKeepAll) {

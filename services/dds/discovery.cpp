@@ -4,9 +4,10 @@
 #include <fmt/format.h>
 #include <netdb.h>
 
-#include <charconv>
 #include <ranges>
 #include <string_view>
+
+#include "idl/types/number.hpp"
 
 namespace jostle::dds {
 namespace {
@@ -16,11 +17,13 @@ Error malformed(const std::string& text, const std::string& why) {
           fmt::format("discovery: got '{}', wanted multicast, peers:HOST[,HOST...] or server:HOST[:PORT]: {}", text, why)};
 }
 
+}  // namespace
+
 Result<std::string> resolve(const std::string& host) {
   const addrinfo hints{.ai_family = AF_INET, .ai_socktype = SOCK_DGRAM};
   addrinfo* found = nullptr;
   if (const int code = getaddrinfo(host.c_str(), nullptr, &hints, &found); code != 0) {
-    return Error{Code::kNotFound, fmt::format("discovery: host '{}': {}; wanted an IPv4 address or a name that "
+    return Error{Code::kNotFound, fmt::format("host '{}': {}; wanted an IPv4 address or a name that "
                                               "resolves to one", host, gai_strerror(code))};
   }
   char text[INET_ADDRSTRLEN] = "";
@@ -28,15 +31,6 @@ Result<std::string> resolve(const std::string& host) {
   freeaddrinfo(found);
   return std::string(text);
 }
-
-// 0 for what is no port.
-std::uint16_t parse_port(std::string_view digits) {
-  std::uint16_t port = 0;
-  const auto [end, problem] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
-  return problem == std::errc{} && end == digits.data() + digits.size() ? port : std::uint16_t{0};
-}
-
-}  // namespace
 
 Result<Discovery> parse_discovery(const std::string& text) {
   if (text == "multicast") return Discovery{};
@@ -50,13 +44,14 @@ Result<Discovery> parse_discovery(const std::string& text) {
     std::uint16_t port = with_port ? kServerPort : std::uint16_t{0};
     if (const std::size_t at = host.find(':'); at != std::string::npos) {
       if (!with_port) return malformed(text, fmt::format("'{}' has a port; peers need none", host));
-      port = parse_port(std::string_view(host).substr(at + 1));
-      if (port == 0) return malformed(text, fmt::format("'{}' has no port from 1 to 65535", host));
+      const auto given = parse_whole<std::uint16_t>(std::string_view(host).substr(at + 1), 1, UINT16_MAX);
+      if (!given) return malformed(text, fmt::format("'{}' has no port from 1 to 65535", host));
+      port = *given;
       host.erase(at);
     }
     if (host.empty()) return malformed(text, "a host is empty");
     auto address_result = resolve(host);
-    if (!address_result) return address_result.error();
+    if (!address_result) return Error{address_result.error().code, "discovery: " + address_result.error().message};
     discovery.hosts.push_back({.address = std::move(address_result).value(), .port = port});
   }
   if (discovery.hosts.empty()) return malformed(text, "a host is empty");

@@ -29,6 +29,9 @@ struct Discovery {
   std::vector<Host> hosts;
 };
 
+/// The IPv4 address that this is, or that this name has. Error kNotFound.
+Result<std::string> resolve(const std::string& host);
+
 /// Reads
 ///
 ///   multicast

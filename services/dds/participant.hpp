@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "idl/types/result.hpp"
 #include "services/dds/discovery.hpp"
@@ -21,21 +22,14 @@ struct SetupError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-enum class Transport {
-  /// UDP everywhere. As fast as shared memory for messages up to 64 KiB, and a
-  /// killed process leaves nothing behind: over shared memory each leaks 549 KB,
-  /// and its successor was found after 2.7 to 4.6 s instead of 0.7 to 1.0 s.
-  kUdp,
-  kDefault,  ///< the profile's, else shared memory on one host and UDP between hosts
-};
+/// `wanted`, else ROS_DOMAIN_ID, else 0. Error kInvalidArgument: says where it came from, got, wanted.
+Result<int> choose_domain(std::optional<int> wanted);
 
 struct ParticipantOptions {
   std::string name = "jostle";  ///< as tools list it
   std::optional<int> domain;    ///< 0 to 232; else ROS_DOMAIN_ID, else 0
-  /// Else JOSTLE_DDS_TRANSPORT ("udp" or "default"), else kDefault when
-  /// FASTRTPS_DEFAULT_PROFILES_FILE is set, else kUdp.
-  std::optional<Transport> transport;
   std::shared_ptr<EndpointWatch> watch;  ///< hears of all others from the first moment; may be empty
+  std::optional<std::string> identity;  ///< folder; empty: unprotected; else JOSTLE_SECURE
 };
 
 /// A discovery server: listens there, introduces participants to each other.
@@ -49,21 +43,24 @@ struct ServerOptions {
 /// another handle to the same participant; writers and readers hold one, so
 /// everything may be destroyed in any order.
 ///
-/// Two more come from the environment, which the programs this one starts inherit; programs
-/// set it by the options --discovery and --secure:
+/// The rest comes from the environment, which the programs this one starts inherit; programs
+/// set the first two by the options --discovery and --secure:
 ///
-///   JOSTLE_DISCOVERY  see parse_discovery(); else multicast
-///   JOSTLE_SECURE     identity folder, see security::open_identity(); else unprotected
+///   JOSTLE_DISCOVERY      see parse_discovery(); else multicast
+///   JOSTLE_SECURE         identity folder, see security::open_identity(); else unprotected
+///   JOSTLE_PROFILES       file of transports and QoS, see profiles_file()
+///   JOSTLE_DDS_TRANSPORT  a participant profile: udp, shared_memory, or one that the file has;
+///                         `default` is the default profile of FASTRTPS_DEFAULT_PROFILES_FILE,
+///                         and the default where that is set; else udp
 ///
-/// The rest comes from the default profile of the file that
-/// FASTRTPS_DEFAULT_PROFILES_FILE names, if any. The lease (2 s) and the
-/// announcement period (500 ms) are set here: the middleware's defaults give
-/// joins of 3 s and stalls of 20 s.
+/// UDP everywhere is as fast as shared memory for messages up to 64 KiB, and a killed process
+/// leaves nothing behind: over shared memory each leaves its segment, and its successor was
+/// found after 2.7 to 4.6 s instead of 0.7 to 1.0 s.
 ///
 /// Threads  safe from any thread.
 class Participant {
  public:
-  /// Errors   kInvalidArgument  domain, transport, discovery or identity; says where it came from
+  /// Errors   kInvalidArgument  domain, transport, discovery, profiles or identity; says where it came from
   ///          kNotFound, kIo    a host, a file of the identity
   ///          kUnavailable      the middleware refused
   static Result<Participant> open(const ParticipantOptions& options);
@@ -77,6 +74,9 @@ class Participant {
   /// Names this participant in messages: the same number that
   /// WriterBase::matched_participants() gives elsewhere.
   std::uint64_t id() const;
+
+  /// Names of the participants found so far, as ParticipantOptions::name has them; ours is among them.
+  std::vector<std::string> others() const;
 
   class Core;
   Core& core() const { return *core_; }

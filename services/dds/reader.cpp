@@ -7,15 +7,22 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 
 #include "services/dds/core.hpp"
+#include "services/dds/profiles.hpp"
 
 namespace jostle::dds {
 namespace {
 
 using namespace eprosima::fastdds::dds;
 
-DataReaderQos reader_qos(const Participant::Core& core, const Qos& qos) {
+DataReaderQos reader_qos(const Participant::Core& core, const std::string& topic, const Qos& qos) {
   DataReaderQos result = core.subscriber->get_default_datareader_qos();
   apply(qos, result);
+  if (qos.kind.empty()) return result;
+  // In force instead, if the file has it: the topic's profile, else its kind's.
+  const auto take = [&](const std::string& name) {
+    return core.subscriber->get_datareader_qos_from_profile(name, result) == ReturnCode_t::RETCODE_OK;
+  };
+  take(topic) || take(std::string(qos.kind));
   return result;
 }
 
@@ -73,11 +80,11 @@ ReaderBase::ReaderBase(const Participant& participant, const std::string& topic,
     : impl_(std::make_unique<Impl>(participant, type, std::move(on_sample))) {
   Participant::Core& core = participant.core();
   impl_->topic = core.acquire_topic(topic, type);
-  impl_->reader = core.subscriber->create_datareader(impl_->topic, reader_qos(core, qos), impl_.get(),
+  impl_->reader = core.subscriber->create_datareader(impl_->topic, reader_qos(core, topic, qos), impl_.get(),
                                                      StatusMask::data_available() << StatusMask::subscription_matched());
   if (impl_->reader) return;
   core.release_topic(impl_->topic);
-  throw SetupError("topic " + topic + ": the middleware refused a reader");
+  throw SetupError("topic " + topic + ": the middleware refused a reader; profiles: " + profiles_file().path.string());
 }
 
 ReaderBase::~ReaderBase() {

@@ -5,19 +5,31 @@
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 
 #include "services/dds/core.hpp"
+#include "services/dds/profiles.hpp"
 
 namespace jostle::dds {
-namespace {
 
 using namespace eprosima::fastdds::dds;
 
-DataWriterQos writer_qos(const Participant::Core& core, const Qos& qos) {
-  DataWriterQos result = core.publisher->get_default_datawriter_qos();
-  apply(qos, result);
-  if (qos.retained) result.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
-  result.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
+void apply_to_writer(const Qos& qos, DataWriterQos& writer) {
+  apply(qos, writer);
+  if (qos.retained) writer.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
+  writer.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
   // A lost last packet is noticed by the next heartbeat; the default is 3 s.
-  result.reliable_writer_qos().times.heartbeatPeriod = {0, 100'000'000};
+  writer.reliable_writer_qos().times.heartbeatPeriod = {0, 100'000'000};
+}
+
+namespace {
+
+DataWriterQos writer_qos(const Participant::Core& core, const std::string& topic, const Qos& qos) {
+  DataWriterQos result = core.publisher->get_default_datawriter_qos();
+  apply_to_writer(qos, result);
+  if (qos.kind.empty()) return result;
+  // In force instead, if the file has it: the topic's profile, else its kind's.
+  const auto take = [&](const std::string& name) {
+    return core.publisher->get_datawriter_qos_from_profile(name, result) == ReturnCode_t::RETCODE_OK;
+  };
+  take(topic) || take(std::string(qos.kind));
   return result;
 }
 
@@ -41,11 +53,11 @@ WriterBase::WriterBase(const Participant& participant, const std::string& topic,
     : impl_(std::make_unique<Impl>(participant)) {
   Participant::Core& core = participant.core();
   impl_->topic = core.acquire_topic(topic, type);
-  impl_->writer = core.publisher->create_datawriter(impl_->topic, writer_qos(core, qos), impl_.get(),
+  impl_->writer = core.publisher->create_datawriter(impl_->topic, writer_qos(core, topic, qos), impl_.get(),
                                                     StatusMask::publication_matched());
   if (impl_->writer) return;
   core.release_topic(impl_->topic);
-  throw SetupError("topic " + topic + ": the middleware refused a writer");
+  throw SetupError("topic " + topic + ": the middleware refused a writer; profiles: " + profiles_file().path.string());
 }
 
 WriterBase::~WriterBase() {

@@ -12,6 +12,16 @@ enum class Verdict {
   kFail,  ///< Jostle cannot work like this
 };
 
+/// "ok", "warn" or "FAIL".
+inline const char* word(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kOk: return "ok";
+    case Verdict::kWarn: return "warn";
+    case Verdict::kFail: break;
+  }
+  return "FAIL";
+}
+
 struct Check {
   std::string name;     ///< what was looked at
   Verdict verdict = Verdict::kOk;

@@ -8,49 +8,76 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "services/doctor/facts.hpp"
+#include "services/doctor/listen.hpp"
 #include "services/doctor/machine.hpp"
 #include "services/doctor/network.hpp"
+#include "services/doctor/peer.hpp"
 #include "services/doctor/shared_memory.hpp"
 #include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
 
+struct Arguments {
+  bool as_json = false, clean = false, listen = false;
+  PeerOptions peer{.host = "", .port = kDoctorPort};
+  dds::ParticipantOptions participant{.name = "jostle_doctor", .domain = {}};
+};
 
-std::vector<Check> examine() {
+// This machine. Before any participant is made.
+std::vector<Check> examine(std::optional<int> domain) {
   std::vector<Check> checks{check_shared_memory(), check_leftovers()};
   std::ranges::copy(check_multicast(), std::back_inserter(checks));
+  checks.push_back(check_profiles());
   checks.push_back(check_udp_buffers());
-  checks.push_back(check_domain());
+  checks.push_back(check_domain(domain));
   checks.push_back(check_cores());
   std::ranges::copy(check_versions(), std::back_inserter(checks));
   checks.push_back(check_worker());
   return checks;
 }
 
-const char* word(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kOk: return "ok";
-    case Verdict::kWarn: return "warn";
-    case Verdict::kFail: break;
-  }
-  return "FAIL";
-}
-
 void print_lines(const std::vector<Check>& checks) {
+  std::size_t width = 16;
+  for (const Check& check : checks) width = std::max(width, check.name.size());
   for (const Check& check : checks) {
-    fmt::print("{:4}  {:16} {}{}{}\n", word(check.verdict), check.name, check.finding,
+    fmt::print("{:4}  {:{}} {}{}{}\n", word(check.verdict), check.name, width, check.finding,
                check.remedy.empty() ? "" : "; remedy: ", check.remedy);
   }
 }
 
-void print_json(const std::vector<Check>& checks) {
-  nlohmann::json list = nlohmann::json::array();
-  for (const Check& check : checks) {
-    list.push_back({{"name", check.name}, {"verdict", word(check.verdict)},
-                    {"finding", check.finding}, {"remedy", check.remedy}});
+int listen(const Arguments& arguments, std::stop_token stop) {
+  const auto fail = [](const Error& error, int code) {
+    fmt::print(stderr, "jostle doctor: {}\n", error.message);
+    return code;
+  };
+  const auto checks = examine(arguments.participant.domain);
+  const auto participant_result = dds::Participant::open(arguments.participant);
+  if (!participant_result) return fail(participant_result.error(), kExitUsage);
+  auto door_result = Door::open(arguments.peer.port);
+  if (!door_result) return fail(door_result.error(), kExitBroken);
+  const auto notice = [](const std::string& text) { fmt::print(stderr, "jostle doctor: {}\n", text); };
+  notice(fmt::format("listens at TCP port {}, domain {}; on the other host: jostle doctor --peer HOST", arguments.peer.port,
+                     participant_result->domain()));
+  listen_to_peers(*participant_result, std::move(door_result).value(), [&] {
+    auto all = checks;
+    std::ranges::copy(check_discovery_servers(*participant_result), std::back_inserter(all));
+    return all;
+  }, notice, std::move(stop));
+  return kExitOk;
+}
+
+int report(const Arguments& arguments) {
+  std::vector<Check> checks = examine(arguments.participant.domain);
+  if (!arguments.peer.host.empty()) std::ranges::copy(check_peer(arguments.peer, arguments.participant), std::back_inserter(checks));
+  if (arguments.as_json) {
+    fmt::print("{}\n", to_json(checks).dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  } else {
+    print_lines(checks);
   }
-  fmt::print("{}\n", list.dump(2));
+  const bool failed = std::ranges::any_of(checks, [](const Check& check) { return check.verdict == Verdict::kFail; });
+  return failed ? kExitFailed : kExitOk;
 }
 
 }  // namespace
@@ -58,15 +85,27 @@ void print_json(const std::vector<Check>& checks) {
 
 int main(int argc, char** argv) {
   using namespace jostle::services;
-  bool as_json = false, clean = false;
-  CLI::App app{"Says what is wrong with this machine, and the remedy. Exits with 1 if anything FAILs.",
+  Arguments arguments;
+  CLI::App app{"Says what is wrong with this machine, and the remedy; with --peer also what is wrong between it and\n"
+               "another one, on which `jostle doctor --listen` runs. Exits with 1 if anything FAILs.",
                "jostle doctor"};
-  app.add_flag("--json", as_json, "a list of {name, verdict, finding, remedy}");
-  app.add_flag("--clean", clean, "first remove shared memory that killed processes left behind");
+  app.add_flag("--json", arguments.as_json, "a list of {name, verdict, finding, remedy}");
+  app.add_flag("--clean", arguments.clean, "first remove shared memory that killed processes left behind");
+  auto* listens = app.add_flag("--listen", arguments.listen, "Answer the doctor of another host, until told to end");
+  app.add_option("--peer", arguments.peer.host, "Address or name of a host: check what works between it and this one")->excludes(listens);
+  app.add_option("--port", arguments.peer.port, "TCP, at which the listening one answers")->capture_default_str()->check(CLI::Range(1, 65535));
+  ProcessOptions process;
+  add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
-  if (clean) remove_leftovers(find_leftovers());
-  const std::vector<Check> checks = examine();
-  as_json ? print_json(checks) : print_lines(checks);
-  const bool failed = std::ranges::any_of(checks, [](const Check& check) { return check.verdict == Verdict::kFail; });
-  return failed ? kExitFailed : 0;
+  die_with_parent(process.parent);
+  arguments.participant.domain = process.domain;
+  if (arguments.clean) remove_leftovers(find_leftovers());
+  try {
+    if (!arguments.listen) return report(arguments);
+    const StopSignal signal;
+    return listen(arguments, signal.token());
+  } catch (const jostle::dds::SetupError& error) {
+    fmt::print(stderr, "jostle doctor: {}\n", error.what());
+    return kExitBroken;
+  }
 }

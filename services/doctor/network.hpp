@@ -2,6 +2,7 @@
 /// \file
 /// What discovery and transport over UDP need.
 
+#include <optional>
 #include <vector>
 
 #include "services/doctor/check.hpp"
@@ -16,7 +17,10 @@ std::vector<Check> check_multicast();
 /// The kernel's limit on receive buffers against what large samples need.
 Check check_udp_buffers();
 
-/// ROS_DOMAIN_ID, where set, is a domain.
-Check check_domain();
+/// The file of transports and QoS can be used. Before any participant is made.
+Check check_profiles();
+
+/// What --domain or ROS_DOMAIN_ID says is a domain.
+Check check_domain(std::optional<int> wanted);
 
 }  // namespace jostle::services

@@ -12,20 +12,23 @@ namespace jostle::services {
 namespace {
 
 // Sorted by name.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kPurposes{{
+constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string_view>>({
+    {"bag", "look into recordings, check, save and export them"},
     {"bench", "measure physics, pools and planners on this machine"},
     {"coordinator", "plan and re-plan with a pool of workers"},
     {"discovery-server", "introduce machines to each other where there is no multicast"},
     {"doctor", "say what is wrong with this machine, and the remedy"},
     {"experiment", "run a study of the thesis and write its figure or table"},
     {"keys", "make, hand out and revoke identities for protected DDS"},
+    {"record", "write topics into a bag"},
     {"render", "draw states of a scene as a picture"},
+    {"replay", "make the decisions of a recorded run again, and compare"},
     {"run", "start everything for a scene on this machine"},
     {"scene", "make, check, disturb and show scene files"},
     {"sim", "simulate the world in which actions happen"},
     {"train-coarse", "train the learned coarse model of pushing"},
     {"worker", "simulate rollouts for whoever asks"},
-}};
+});
 
 // Levenshtein's distance, one row at a time.
 std::size_t edits(std::string_view a, std::string_view b) {

@@ -109,7 +109,8 @@ Result<Hash> RemotePool::load(const physics_pool::Scene& scene) {
   description.scene(text);
   if (!world_writer_.write(description)) {
     return Error{Code::kUnavailable,
-                 fmt::format("{}: world {} could not be announced; a client may load {} worlds",
+                 fmt::format("{}: world {} could not be announced; a client may load as many as the "
+                             "topic's profile has instances, {} unless changed",
                              topics::kPoolWorld.name, to_string(hash), topics::kPoolWorld.qos.instances)};
   }
   const std::lock_guard lock(mutex_);

@@ -78,12 +78,21 @@ class Line {
   double seconds_ = 0.0;
 };
 
+// Of this process, all threads.
+double cpu_seconds() {
+  timespec used{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+}
+
 nlohmann::json to_json(const RecordReport& report) {
   nlohmann::json json{{"bags", nlohmann::json::array()},
                       {"seconds", report.status.seconds},
                       {"messages", nlohmann::json::object()},
                       {"lost", nlohmann::json::object()},
                       {"bytes", report.status.bytes},
+                      {"cpu_seconds", cpu_seconds()},
+                      {"worst_write_seconds", report.status.worst_write},
                       {"reason", report.reason},
                       {"problem", report.problem ? report.problem->message : ""}};
   for (const auto& bag : report.bags) json["bags"].push_back(bag.string());
@@ -181,6 +190,7 @@ int main(int argc, char** argv) {
                   {"options", fmt::format("{}", fmt::join(words, " "))}};
   const StopSignal signal;
   std::signal(SIGUSR1, on_trigger);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   try {
     return record(std::move(options), arguments.json, signal.token());
   } catch (const std::exception& error) {  // no memory

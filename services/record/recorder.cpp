@@ -8,8 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include "services/bag/definitions.hpp"
 #include "services/dds/names.hpp"
-#include "services/dds/system_topics.hpp"
 #include "services/dds/topics.hpp"
 
 namespace jostle::services {
@@ -20,7 +20,9 @@ constexpr std::chrono::milliseconds kFlush{400};     // and a tick: half a secon
 constexpr std::chrono::milliseconds kAfterResult{300};  // the last words around a result
 constexpr std::uint64_t kLookAtDisk = 16 << 20;      // bytes written before the next look at the disk
 
-const dds::RawTopic kTrigger{"rt/record/trigger", "std_msgs::msg::dds_::Empty_", {.reliable = false, .depth = dds::kKeepAll}};
+// Reliable, as `ros2 topic pub` is: a best-effort reader misses what comes before it has found
+// the writer, even if the writer has found it.
+const dds::RawTopic kTrigger{"rt/record/trigger", "std_msgs::msg::dds_::Empty_", {.depth = dds::kKeepAll}};
 
 bag::Time wall_clock() {
   const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
@@ -39,13 +41,6 @@ Result<std::uint64_t> free_disk(std::filesystem::path place) {
     return Error{Code::kIo, fmt::format("{}: free disk space is unknown: {}", place.string(), std::strerror(errno))};
   }
   return static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize;
-}
-
-// TODO(#6): the text of the definition, which the room of bags will know.
-std::optional<std::string> definition_of(const std::string& type) {
-  const auto& topics = dds::system_topics();
-  const bool known = std::ranges::any_of(topics, [&](const auto& topic) { return dds::ros_type(topic.type) == type; });
-  return known ? std::optional<std::string>("") : std::nullopt;
 }
 
 double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
@@ -67,9 +62,14 @@ class Recorder::OpenBag {
       if (!index_result) return index_result.error();
       topic.index = *index_result;
     }
-    return writer_->write(topic.index, {.log_time = log_time, .publish_time = sample.publish_time, .sequence = ++topic.messages,
-                                        .data = sample.data});
+    const auto begin = Clock::now();
+    auto written = writer_->write(topic.index, {.log_time = log_time, .publish_time = sample.publish_time, .sequence = ++topic.messages,
+                                               .data = sample.data});
+    worst_write_ = std::max(worst_write_, Clock::now() - begin);
+    return written;
   }
+
+  Clock::duration worst_write() const { return worst_write_; }
 
   bag::BagWriter& writer() { return *writer_; }
 
@@ -82,6 +82,7 @@ class Recorder::OpenBag {
   std::unique_ptr<bag::BagWriter> writer_;
   const Subscriptions& subscriptions_;
   std::vector<Place> places_;  // by topic
+  Clock::duration worst_write_{0};
 };
 
 Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher watcher) {
@@ -103,7 +104,7 @@ Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher
   auto subscriptions_result = Subscriptions::open(
       {.domain = own.domain,
        .selection = own.selection,
-       .definition = [](const std::string& type) { return definition_of(type); },
+       .definition = [](const std::string& type) { return bag::definition_of(type); },
        .on_sample = [self = recorder.get()](int topic, std::span<const std::byte> data,
                                             const dds::Origin& origin) { self->on_sample(topic, data, origin); },
        .on_warning = recorder->watcher_.on_warning});
@@ -169,47 +170,48 @@ RecordReport Recorder::run(std::stop_token stop) {
       if (bag_) {
         bag_->writer().set_note("lost", lost_note());
         if (auto ok = bag_->writer().flush(); !ok) return finish("failed", ok.error());
-        safe_ = written_;
+        for (Tally& tally : tallies_) tally.safe = tally.written;
       }
-      if (auto ok = check_disk(); !ok) return finish("the disk is nearly full", ok.error());
+      look_at_disk();
       if (watcher_.on_progress) watcher_.on_progress(status());
     }
+    if (disk_problem_) return finish("the disk is nearly full", {});
     if (stop.stop_requested()) return finish("stopped", {});
     if (end && now >= *end) return finish(reason == "stopped" ? "its time is over" : reason, {});
   }
 }
 
+Recorder::Tally& Recorder::tally_of(int topic) {
+  const auto place = static_cast<std::size_t>(topic);
+  if (tallies_.size() <= place) tallies_.resize(place + 1);
+  Tally& tally = tallies_[place];
+  if (!std::exchange(tally.known, true)) {
+    const bag::Topic known = subscriptions_->topic(topic);
+    tally.latched = known.qos.latched;
+    tally.is_result = known.name == dds::ros_topic(topics::kTaskResult.name);
+  }
+  return tally;
+}
+
 Result<void> Recorder::take_in(std::vector<QueuedSample> samples) {
   Result<void> result;
   for (QueuedSample& sample : samples) {
-    const auto place = static_cast<std::size_t>(sample.topic);
-    if (written_.size() <= place) written_.resize(place + 1), unwritten_.resize(place + 1);
-    if (options_.until_result && sample.publish_time >= started_at_ && is_result(sample.topic)) result_seen_ = true;
-    if (!result) {
-      ++unwritten_[place];
-      continue;
-    }
+    Tally& tally = tally_of(sample.topic);
     const std::uint64_t memory = sample.memory();
-    if (bag_) {
-      result = bag_->write(sample, sample.log_time);
-    } else {
-      keep(std::move(sample));
-    }
+    // Results of earlier tasks are kept by who wrote them.
+    if (options_.until_result && tally.is_result && sample.publish_time >= started_at_) result_seen_ = true;
+    if (result && bag_) result = bag_->write(sample, sample.log_time);
     if (!result) {
-      ++unwritten_[place];
+      ++tally.unwritten;
       continue;
     }
-    ++written_[place];
+    if (!bag_) keep(std::move(sample));
+    ++tally.written;
     ++messages_;
     unchecked_ += memory;
-    if (unchecked_ >= kLookAtDisk) result = check_disk();
+    if (unchecked_ >= kLookAtDisk) look_at_disk();
   }
   return result;
-}
-
-bool Recorder::is_result(int topic) {
-  if (result_topic_ < 0 && subscriptions_->topic(topic).name == *dds::ros_topic(topics::kTaskResult.name)) result_topic_ = topic;
-  return topic == result_topic_;
 }
 
 void Recorder::keep(QueuedSample sample) {
@@ -232,7 +234,7 @@ void Recorder::forget_old(bag::Time now) {
     QueuedSample sample = std::move(ring_.front());
     ring_.pop_front();
     ring_bytes_ -= sample.memory();
-    if (subscriptions_->topic(sample.topic).qos.latched) in_force_.insert_or_assign(sample.topic, std::move(sample));
+    if (tally_of(sample.topic).latched) in_force_.insert_or_assign(sample.topic, std::move(sample));
   }
 }
 
@@ -271,8 +273,7 @@ Result<void> Recorder::write_snapshots() {
   return result;
 }
 
-Result<void> Recorder::check_disk() {
-  unchecked_ = 0;
+Result<void> Recorder::check_disk() const {
   auto free_result = free_disk(options_.folder);
   if (!free_result) return free_result.error();
   if (*free_result >= options_.min_free) return {};
@@ -282,7 +283,7 @@ Result<void> Recorder::check_disk() {
 
 std::uint64_t Recorder::lost(int topic) const {
   const auto place = static_cast<std::size_t>(topic);
-  const std::uint64_t unwritten = place < unwritten_.size() ? unwritten_[place] : 0;
+  const std::uint64_t unwritten = place < tallies_.size() ? tallies_[place].unwritten : 0;
   return subscriptions_->missing(topic) + queue_.overflowed(topic) + unwritten;
 }
 
@@ -295,56 +296,63 @@ bag::Note Recorder::lost_note() const {
 RecordStatus Recorder::status() const {
   RecordStatus status{.seconds = std::chrono::duration<double>(Clock::now() - started_).count()};
   status.messages = bag_ ? messages_ : ring_.size();
+  if (bag_) status.worst_write = std::chrono::duration<double>(bag_->worst_write()).count();
   status.bytes = bag_ ? bag_->writer().bytes() : ring_bytes_;
   for (int topic = 0; topic < topics(); ++topic) status.lost += lost(topic);
-  status.topics = static_cast<int>(std::ranges::count_if(written_, [](std::uint64_t count) { return count > 0; }));
+  status.topics = static_cast<int>(std::ranges::count_if(tallies_, [](const Tally& tally) { return tally.written > 0; }));
   if (auto free_result = free_disk(options_.folder)) status.free_disk = *free_result;
   return status;
 }
 
 // After a failed write: what was written since the last flush may or may not be on the disk.
 void Recorder::count_unsafe() {
-  safe_.resize(written_.size());
-  for (std::size_t topic = 0; topic < written_.size(); ++topic) {
-    const std::uint64_t unsafe = written_[topic] - safe_[topic];
-    unwritten_[topic] += unsafe;
-    written_[topic] -= unsafe;
+  for (Tally& tally : tallies_) {
+    const std::uint64_t unsafe = tally.written - tally.safe;
+    tally.written -= unsafe;
+    tally.unwritten += unsafe;
     messages_ -= unsafe;
   }
 }
 
-RecordReport Recorder::finish(std::string reason, std::optional<Error> problem) {
+void Recorder::look_at_disk() {
+  unchecked_ = 0;
+  if (auto ok = check_disk(); !ok) disk_problem_ = ok.error();
+}
+
+RecordReport Recorder::finish(std::string reason, std::optional<Error> failure) {
   trigger_reader_.reset();
-  subscriptions_->close();
-  // What came before the end belongs to it; after a problem it is counted as lost.
-  auto rest = queue_.take(Clock::now(), {});
-  if (problem) {
-    for (const QueuedSample& sample : rest) {
-      const auto place = static_cast<std::size_t>(sample.topic);
-      if (unwritten_.size() <= place) written_.resize(place + 1), unwritten_.resize(place + 1);
-      ++unwritten_[place];
+  for (const auto& [topic, refusals] : subscriptions_->unmatched()) {
+    if (watcher_.on_warning) {
+      watcher_.on_warning(fmt::format("{}: it has a writer and none of its messages came; got {} refusals by the middleware, wanted "
+                                      "an offer that a plain reader takes (shared ownership, no partition)", topic, refusals));
     }
-  } else if (auto ok = take_in(std::move(rest)); !ok) {
-    problem = ok.error();
   }
-  if (!problem) {
-    if (auto ok = write_snapshots(); !ok) problem = ok.error();
+  subscriptions_->close();
+  // What came before the end belongs to it; after a failed write it is counted as lost.
+  auto rest = queue_.take(Clock::now(), {});
+  if (failure) {
+    for (const QueuedSample& sample : rest) ++tally_of(sample.topic).unwritten;
+  } else if (auto ok = take_in(std::move(rest)); !ok) {
+    failure = ok.error();
+  }
+  if (!failure) {
+    if (auto ok = write_snapshots(); !ok) failure = ok.error();
   }
   RecordReport report{.reason = std::move(reason)};
   if (bag_) {
-    if (problem) count_unsafe();
+    if (failure) count_unsafe();
     bag_->writer().set_note("lost", lost_note());
-    if (auto ok = bag_->writer().close(); !ok && !problem) problem = ok.error();
+    if (auto ok = bag_->writer().close(); !ok && !failure) failure = ok.error();
   }
   report.bags = bags_;
   report.status = status();
   if (!bag_) report.status.bytes = snapshot_bytes_;
   for (int topic = 0; topic < topics(); ++topic) {
     const auto place = static_cast<std::size_t>(topic);
-    report.topics[subscriptions_->topic(topic).name] = {.messages = place < written_.size() ? written_[place] : 0,
+    report.topics[subscriptions_->topic(topic).name] = {.messages = place < tallies_.size() ? tallies_[place].written : 0,
                                                         .lost = lost(topic)};
   }
-  report.problem = std::move(problem);
+  report.problem = failure ? failure : disk_problem_;
   return report;
 }
 

@@ -48,6 +48,7 @@ struct RecordStatus {
   std::uint64_t lost = 0;
   std::uint64_t free_disk = 0;  ///< bytes
   int topics = 0;               ///< with messages
+  double worst_write = 0.0;     ///< s, longest single write to the bag; without a ring
 };
 
 struct RecordReport {
@@ -94,21 +95,30 @@ class Recorder {
   using Clock = std::chrono::steady_clock;
   class OpenBag;
 
+  // Of a topic: samples, and what does not change once there is one.
+  struct Tally {
+    std::uint64_t written = 0, unwritten = 0;
+    std::uint64_t safe = 0;  // of the written ones, those that the operating system has
+    bool known = false;
+    bool latched = false, is_result = false;
+  };
+
   Recorder(RecordOptions options, Watcher watcher);
 
   void on_sample(int topic, std::span<const std::byte> data, const dds::Origin& origin);
   std::filesystem::path next_folder() const;
   Result<void> take_in(std::vector<QueuedSample> samples);
-  bool is_result(int topic);
+  Tally& tally_of(int topic);
   void keep(QueuedSample sample);
   Result<void> write_snapshots();
-  Result<void> check_disk();
+  Result<void> check_disk() const;
+  void look_at_disk();
   void forget_old(bag::Time now);
   bag::Note lost_note() const;
   std::uint64_t lost(int topic) const;
   RecordStatus status() const;
   void count_unsafe();
-  RecordReport finish(std::string reason, std::optional<Error> problem);
+  RecordReport finish(std::string reason, std::optional<Error> failure);
 
   const RecordOptions options_;
   const Watcher watcher_;
@@ -116,7 +126,6 @@ class Recorder {
   const bag::Time started_at_;
   SampleQueue queue_;
   std::atomic<int> triggers_ = 0;
-  int result_topic_ = -1;
   bool result_seen_ = false;
   int snapshots_ = 0;
 
@@ -125,10 +134,10 @@ class Recorder {
   bool ring_short_ = false;
   std::map<int, QueuedSample> in_force_;  // by topic: newest of a latched one that left the ring
 
-  std::vector<std::uint64_t> written_, unwritten_;  // by topic
-  std::vector<std::uint64_t> safe_;                 // of written_, what the operating system has
+  std::vector<Tally> tallies_;  // by topic
   std::uint64_t messages_ = 0;
   std::uint64_t unchecked_ = 0;  // bytes since the disk was looked at
+  std::optional<Error> disk_problem_;  // less free than min_free
   std::uint64_t snapshot_bytes_ = 0;
   std::vector<std::filesystem::path> bags_;
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <condition_variable>
 #include <deque>
@@ -58,9 +59,13 @@ struct Subscriptions::Impl {
     participant.reset();  // its threads call note()
   }
 
-  void close() {
+  void stop_following() {
     closing.request_stop();
     if (worker.joinable()) worker.join();
+  }
+
+  void close() {
+    stop_following();
     for (const auto& state : states) {
       for (auto& reader : state->readers) reader.reset();
     }
@@ -84,9 +89,16 @@ struct Subscriptions::Impl {
     const std::lock_guard lock(mutex);
     if (endpoint.kind == Endpoint::Kind::kWriter) {
       offers.try_emplace(endpoint.topic, dds::Qos{.reliable = endpoint.reliable, .latched = endpoint.latched});
+      writers.emplace(endpoint.guid, endpoint.topic);
     }
     found.push_back(endpoint);
     news.notify_one();
+  }
+
+  // Likewise.
+  void forget(const Endpoint& endpoint) {
+    const std::lock_guard lock(mutex);
+    writers.erase(endpoint.guid);
   }
 
   void follow(std::stop_token stop) {
@@ -166,6 +178,23 @@ struct Subscriptions::Impl {
         });
   }
 
+  // While nobody makes readers.
+  std::vector<std::pair<std::string, std::uint64_t>> unmatched() {
+    stop_following();
+    const std::lock_guard lock(mutex);
+    std::vector<std::pair<std::string, std::uint64_t>> found_ones;
+    for (const auto& state : states) {
+      const bool written = std::ranges::any_of(writers, [&](const auto& writer) { return writer.second == state->wire_name; });
+      int matched = 0;
+      std::uint64_t refusals = 0;
+      for (const auto& reader : state->readers) {
+        if (reader) matched += reader->matched(), refusals += reader->troubles().incompatible;
+      }
+      if (written && matched == 0 && refusals > 0) found_ones.emplace_back(state->topic.name, refusals);
+    }
+    return found_ones;
+  }
+
   void warn(const std::string& about, const std::string& text) {
     if (warned.insert(about).second && options.on_warning) options.on_warning(text);
   }
@@ -178,6 +207,7 @@ struct Subscriptions::Impl {
   std::condition_variable_any news;
   std::deque<Endpoint> found;
   std::map<std::string, dds::Qos> offers;  // of the first writer, by the topic's name on the wire
+  std::map<dds::Guid, std::string> writers;  // there now; their topics, likewise
   std::deque<std::unique_ptr<TopicState>> states;
 
   std::stop_source closing;
@@ -186,7 +216,8 @@ struct Subscriptions::Impl {
 
 Result<std::unique_ptr<Subscriptions>> Subscriptions::open(Options options) {
   auto impl = std::make_unique<Impl>(std::move(options));
-  const auto watch = std::make_shared<dds::EndpointWatch>([impl = impl.get()](const Endpoint& endpoint) { impl->note(endpoint); });
+  const auto watch = std::make_shared<dds::EndpointWatch>([impl = impl.get()](const Endpoint& endpoint) { impl->note(endpoint); },
+                                                          [impl = impl.get()](const Endpoint& endpoint) { impl->forget(endpoint); });
   auto participant_result =
       dds::Participant::open({.name = "jostle_record", .domain = impl->options.domain, .watch = watch});
   if (!participant_result) return participant_result.error();
@@ -230,6 +261,8 @@ std::uint64_t Subscriptions::missing(int index) const {
   for (const auto& [writer, seen] : state->seen) sum += seen.missing();
   return sum;
 }
+
+std::vector<std::pair<std::string, std::uint64_t>> Subscriptions::unmatched() { return impl_->unmatched(); }
 
 void Subscriptions::close() { impl_->close(); }
 

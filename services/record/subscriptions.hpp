@@ -7,6 +7,8 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "idl/types/result.hpp"
 #include "services/bag/message.hpp"
@@ -51,6 +53,11 @@ class Subscriptions {
 
   /// Samples between the first and the last one of each writer that did not come.
   std::uint64_t missing(int topic) const;
+
+  /// Topics that are written and subscribed to, and no writer of which a reader here could be
+  /// matched with: it offers what nobody asks for, exclusive ownership, say. With the number of
+  /// refusals that the middleware tells of. No topic is subscribed to after this.
+  std::vector<std::pair<std::string, std::uint64_t>> unmatched();
 
   /// No on_sample follows.
   void close();

@@ -1,24 +1,27 @@
-// jostle render: pictures of a scene's states.
+// jostle render: pictures and films of a scene's states, or of a recorded run.
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "physics_pool/render/montage.hpp"
-#include "physics_pool/render/renderer.hpp"
+#include "services/render_cli/bag_frames.hpp"
+#include "services/render_cli/film.hpp"
 #include "services/render_cli/frames.hpp"
 #include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
 
+constexpr int kSheetFrames = 8;  // of a recorded run, unless told
 
 struct Arguments {
   std::filesystem::path input, output;
-  int columns = 4;
-  std::string size = "640x480";
-  physics_pool::RenderOptions options;
+  std::string size = "640x480", clock = "world";
+  double speed = 1.0;
+  BagFramesOptions bag;
+  DrawOptions draw;
 };
 
 // "640x480" into two numbers; nothing else.
@@ -28,32 +31,20 @@ bool parse_size(const std::string& text, physics_pool::RenderOptions& options) {
          static_cast<std::size_t>(end) == text.size();
 }
 
-Result<std::vector<physics_pool::Picture>> draw(const Frames& input,
-                                                const physics_pool::RenderOptions& options) {
-  auto renderer_result = physics_pool::Renderer::create(input.scene, options);
-  if (!renderer_result) return renderer_result.error();
-  std::vector<physics_pool::Picture> pictures;
-  for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    auto picture_result = renderer_result->render(input.frames[i].state);
-    if (!picture_result) {
-      return Error{picture_result.error().code, fmt::format("frames[{}].{}", i, picture_result.error().message)};
-    }
-    pictures.push_back(std::move(picture_result).value());
-  }
-  return pictures;
+Result<Frames> load(const Arguments& arguments) {
+  if (arguments.input.extension() == ".json") return load_frames(arguments.input);
+  if (arguments.input.extension() == ".yaml" || arguments.input.extension() == ".yml") return load_start(arguments.input);
+  BagFramesOptions options = arguments.bag;
+  options.clock = arguments.clock == "wall" ? RunClock::kWall : RunClock::kWorld;
+  options.per_second = arguments.draw.per_second / arguments.speed;
+  if (options.count == 0 && is_sheet(arguments.output)) options.count = kSheetFrames;
+  return load_bag(arguments.input, options);
 }
 
-Result<void> run(const Arguments& arguments) {
-  auto input_result = arguments.input.extension() == ".json" ? load_frames(arguments.input)
-                                                             : load_start(arguments.input);
-  if (!input_result) return input_result.error();
-  auto pictures_result = draw(*input_result, arguments.options);
-  if (!pictures_result) return pictures_result.error();
-  std::vector<std::string> captions;
-  for (const Frame& frame : input_result->frames) captions.push_back(frame.caption);
-  auto sheet_result = physics_pool::montage(*pictures_result, captions, arguments.columns);
-  if (!sheet_result) return sheet_result.error();
-  return physics_pool::write_png(arguments.output, *sheet_result);
+Result<void> run(const Arguments& arguments, std::stop_token stop) {
+  auto frames_result = load(arguments);
+  if (!frames_result) return frames_result.error();
+  return draw(*frames_result, arguments.output, arguments.draw, std::move(stop));
 }
 
 }  // namespace
@@ -62,22 +53,39 @@ Result<void> run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   using namespace jostle::services;
   Arguments arguments;
-  CLI::App app{"Draws states of a scene, side by side with captions, as a PNG.", "jostle render"};
+  CLI::App app{"Draws states of a scene, or a recorded run, with captions: a PNG with all side by side, a folder of\n"
+               "PNGs, or a film (MP4, GIF).", "jostle render"};
   app.add_option("input", arguments.input,
-                 "STATES.json with a scene and frames of {caption, q}, or SCENE.yaml for its start")->required();
-  app.add_option("-o,--output", arguments.output, "the PNG to write")->required();
-  app.add_option("--columns", arguments.columns, "pictures in a row")
+                 "BAG with a recorded run; STATES.json with a scene and frames of {caption, q}; or SCENE.yaml for its start")->required();
+  app.add_option("-o,--output", arguments.output, "NAME.png, NAME.mp4, NAME.gif, or a folder for frame-00001.png, ...")->required();
+  app.add_option("--columns", arguments.draw.columns, "of a PNG: pictures in a row")
       ->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--size", arguments.size, "WxH of each picture, pixels")->capture_default_str();
-  app.add_option("--camera", arguments.options.camera, "overview or top")->capture_default_str();
+  app.add_option("--camera", arguments.draw.picture.camera, "overview or top")->capture_default_str();
+  app.add_option("--fps", arguments.draw.per_second, "of a film or folder: pictures per second")
+      ->check(CLI::Range(0.1, 120.0))->capture_default_str();
+  app.add_option("--frames", arguments.bag.count, "of a bag: so many, evenly spread (default: 8 for a PNG, else by --fps)")
+      ->check(CLI::Range(1, 100000));
+  app.add_option("--speed", arguments.speed, "of a bag: run seconds per second of film")
+      ->check(CLI::Range(0.01, 1000.0))->capture_default_str();
+  app.add_option("--clock", arguments.clock, "of a bag: world, which may stand still while a plan is made, or wall")
+      ->check(CLI::IsMember({"world", "wall"}))->capture_default_str();
+  app.add_option("--goal", arguments.bag.goal, "of a bag with several runs: which");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
-  if (!parse_size(arguments.size, arguments.options)) {
+  if (!parse_size(arguments.size, arguments.draw.picture)) {
     fmt::print(stderr, "jostle render: --size: got '{}', wanted WxH such as 640x480\n", arguments.size);
     return kExitUsage;
   }
-  if (auto ok = run(arguments); !ok) {
-    fmt::print(stderr, "jostle render: {}\n", ok.error().message);
-    return kExitFailed;
+  if (isatty(STDERR_FILENO)) {
+    arguments.draw.on_progress = [](std::size_t drawn, std::size_t all) {
+      fmt::print(stderr, "\r{} of {} frames{}", drawn, all, drawn == all ? "\n" : "");
+      std::fflush(stderr);
+    };
   }
-  return 0;
+  const StopSignal signal;
+  if (auto ok = run(arguments, signal.token()); !ok) {
+    fmt::print(stderr, "jostle render: {}\n", ok.error().message);
+    return ok.error().code == jostle::Code::kCancelled ? kExitInterrupted : kExitFailed;
+  }
+  return kExitOk;
 }

@@ -69,7 +69,13 @@ std::optional<Difference> compare_given(const Plan& a, const Plan& b) {
     difference.replayed = fmt::format("{}", replayed);
     return true;
   };
-  if (differs("place in the run (actions before it)", a.observation(), b.observation())) return difference;
+  if (a.observation() != b.observation()) {
+    difference.decision = fmt::format("plan {}", a.number());
+    difference.field = "when it was made";
+    difference.recorded = fmt::format("after action {}", a.observation());
+    difference.replayed = fmt::format("after action {}", b.observation());
+    return difference;
+  }
   if (!same_bits(a.q(), b.q()) || !same_bits(a.v(), b.v())) {
     difference.field = "start state, made feasible";
     difference.recorded = difference.replayed = "the same observation";

@@ -8,7 +8,7 @@
 
 #include "idl/msg/task.h"
 #include "idl/types/state.hpp"
-#include "services/replay/recorded_run.hpp"
+#include "services/recorded/recorded_run.hpp"
 
 namespace jostle::services {
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "services/replay/report.hpp"
@@ -31,12 +30,8 @@ Result<std::vector<RecordedRun>> load(const Arguments& arguments) {
   auto reader_result = bag::BagReader::open(arguments.bag);
   if (!reader_result) return reader_result.error();
   auto runs_result = read_runs(**reader_result);
-  if (!runs_result || arguments.goal.empty()) return runs_result;
-  std::string ids;
-  for (const RecordedRun& run : *runs_result) ids += (ids.empty() ? "" : ", ") + run.run.goal().goal_id();
-  std::erase_if(*runs_result, [&](const RecordedRun& run) { return run.run.goal().goal_id() != arguments.goal; });
-  if (!runs_result->empty()) return runs_result;
-  return Error{Code::kNotFound, fmt::format("--goal: got '{}', wanted one of this bag: {}", arguments.goal, ids)};
+  if (!runs_result) return runs_result.error();
+  return select_runs(std::move(runs_result).value(), arguments.goal);
 }
 
 int perform(Arguments arguments, std::stop_token stop) {

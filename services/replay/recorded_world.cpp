@@ -2,8 +2,6 @@
 
 #include <condition_variable>
 
-#include "services/task/journal.hpp"
-#include "services/world_link/messages.hpp"
 
 namespace jostle::services {
 
@@ -11,6 +9,8 @@ RecordedWorld::RecordedWorld(const RecordedRun& run, double rate)
     : run_(run), rate_(rate), start_(std::chrono::steady_clock::now()) {}
 
 double RecordedWorld::time() const { return seconds(run_.observations[at_].header()); }
+
+Result<Seen> RecordedWorld::seen() const { return from_message(run_.observations[at_]); }
 
 Result<void> RecordedWorld::advance(std::stop_token stop) {
   if (at_ + 1 == run_.observations.size()) {
@@ -29,7 +29,9 @@ Result<void> RecordedWorld::advance(std::stop_token stop) {
 }
 
 Result<robot_bridge::RobotReading> RecordedWorld::Robot::read() {
-  return reading_of(world_.run_.observations[world_.at_]);
+  auto seen_result = world_.seen();
+  if (!seen_result) return seen_result.error();
+  return std::move(seen_result->robot);
 }
 
 Result<void> RecordedWorld::Robot::execute(std::span<const double>, double, std::stop_token stop) {
@@ -37,11 +39,9 @@ Result<void> RecordedWorld::Robot::execute(std::span<const double>, double, std:
 }
 
 Result<std::vector<perception::ObjectReading>> RecordedWorld::Objects::read() {
-  const jostle_msgs::msg::Observation& seen = world_.run_.observations[world_.at_];
-  jostle_msgs::msg::ObjectStates states;
-  states.header(seen.header());
-  states.objects(seen.objects());
-  return from_message(states);
+  auto seen_result = world_.seen();
+  if (!seen_result) return seen_result.error();
+  return std::move(seen_result->objects);
 }
 
 }  // namespace jostle::services

@@ -7,7 +7,8 @@
 
 #include "perception/api/object_source.hpp"
 #include "robot_bridge/api/robot.hpp"
-#include "services/replay/recorded_run.hpp"
+#include "services/recorded/recorded_run.hpp"
+#include "services/world_link/messages.hpp"
 
 namespace jostle::services {
 
@@ -27,6 +28,7 @@ class RecordedWorld {
   bool asked_for_more() const { return over_; } ///< a command came after the last observation
 
  private:
+  Result<Seen> seen() const;
   Result<void> advance(std::stop_token stop);
 
   const RecordedRun& run_;

@@ -10,7 +10,7 @@
 #include "physics_pool/api/pool.hpp"
 #include "services/replay/changes.hpp"
 #include "services/replay/comparison.hpp"
-#include "services/replay/recorded_run.hpp"
+#include "services/recorded/recorded_run.hpp"
 
 namespace jostle::services {
 

@@ -67,6 +67,7 @@ int perform(const RunOptions& options, std::stop_token stop) {
   display.finish();
   if (!result) return fail(result.error(), result.error().code == Code::kCancelled ? kExitInterrupted : kExitBroken);
   if (!result->error().empty()) return fail({Code::kUnavailable, result->error()}, kExitBroken);
+  (*session_result)->finish_recording();
   session_result->reset();  // before drawing: every process it started is gone
   if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), kExitBroken);
   return result->success() ? kExitOk : kExitFailed;
@@ -100,6 +101,7 @@ int main(int argc, char** argv) {
   app.add_option("--parameters", arguments.parameters, "Planner's and controller's (default: experiments/grasping.yaml, or pushing.yaml)");
   app.add_option("--json", options.json, "File for the result");
   app.add_option("--picture", options.picture, "PNG of the execution");
+  app.add_option("--record", options.record, "Folder for a bag of the whole run; `jostle record` has more to say");
   app.add_option("--rate", options.rate, "World seconds per second while acting; 0: as fast as possible")
       ->capture_default_str()->check(CLI::Range(0.0, 1000.0));
   app.add_flag("--plan-only", options.plan_only, "Stop after the first plan");

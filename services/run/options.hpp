@@ -29,6 +29,7 @@ struct RunOptions {
   bool headless = false; ///< plain lines instead of a live display
   std::optional<int> domain;
   std::filesystem::path json, picture;  ///< empty: none
+  std::filesystem::path record;         ///< a bag's folder; empty: nothing is recorded
 };
 
 }  // namespace jostle::services

@@ -15,6 +15,7 @@ constexpr std::chrono::milliseconds kSilence{1500};  // of a process that speaks
 constexpr std::chrono::seconds kStart{15};           // for processes to start and find each other
 constexpr std::chrono::milliseconds kTick{50};
 constexpr std::chrono::seconds kCancelPatience{2};
+constexpr std::chrono::seconds kLastWords{2};        // for the recorder to hear of the result, and end
 constexpr int kMostRestarts = 5;                     // within kRestartWindow: something is wrong
 constexpr std::chrono::seconds kRestartWindow{10};
 
@@ -34,6 +35,7 @@ Result<std::unique_ptr<Session>> Session::start(const RunOptions& options, Watch
   if (!folder_result) return folder_result.error();
   std::unique_ptr<Session> session(
       new Session(options, std::move(watcher), *participant_result, std::move(claim_result).value(), *folder_result));
+  if (auto ok = session->start_recorder(); !ok) return ok.error();
   if (auto ok = session->start_processes(); !ok) return ok.error();
   return session;
 }
@@ -57,11 +59,53 @@ Session::~Session() {
   for (ChildProcess& worker : workers_) worker.terminate();
   if (world_process_) world_process_->terminate();
   if (coordinator_process_) coordinator_process_->terminate();
+  if (recorder_process_) recorder_process_->terminate();
   workers_.clear();
   world_process_.reset();
   coordinator_process_.reset();
+  finish_recording();
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
+}
+
+// Before everything else, so that it hears everything else.
+Result<void> Session::start_recorder() {
+  if (options_.record.empty()) return {};
+  auto process_result = ChildProcess::start(
+      program("record"),
+      {"--output", options_.record.string(), "--until-result", "--domain", std::to_string(participant_.domain()),
+       "--die-with-parent", std::to_string(getpid())},
+      folder_ / "record.log");
+  if (!process_result) return process_result.error();
+  recorder_process_ = std::move(process_result).value();
+  const auto deadline = Clock::now() + kStart;
+  while (!recorder_process_->has_said("ready")) {
+    const auto ended = recorder_process_->wait_for(kTick);
+    if (ended || Clock::now() >= deadline) {
+      const Error error{ended ? Code::kInvalidArgument : Code::kUnavailable,
+                        fmt::format("the recorder {}:\n{}", ended ? "did not start" : "is not ready", recorder_process_->last_words())};
+      recorder_process_.reset();
+      return error;
+    }
+  }
+  return {};
+}
+
+void Session::finish_recording() {
+  if (!recorder_process_) return;
+  if (!recorder_process_->wait_for(kLastWords)) recorder_process_->terminate();
+  recorder_process_->wait_for(kStart);
+  look_after_recorder();
+}
+
+void Session::look_after_recorder() {
+  if (!recorder_process_) return;
+  const auto ended = recorder_process_->ended();
+  if (!ended) return;
+  if (*ended != "exit code 0" && watcher_.on_notice) {
+    watcher_.on_notice(fmt::format("the recorder ended: {}\n{}", *ended, recorder_process_->last_words()));
+  }
+  recorder_process_.reset();
 }
 
 Result<void> Session::start_processes() {
@@ -181,6 +225,7 @@ Result<void> Session::send_goal() {
 }
 
 Result<void> Session::look_after() {
+  look_after_recorder();
   if (auto ok = check_alive("the simulated world", *world_process_); !ok) return ok;
   if (auto ok = check_alive("the coordinator", *coordinator_process_); !ok) return ok;
   if (world_heard_) {

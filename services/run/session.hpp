@@ -26,6 +26,7 @@ namespace jostle::services {
 ///   a worker that ends is replaced; its work goes to the others meanwhile
 ///   a world or coordinator that ends, or is silent for kSilence, ends the run
 ///   with an error that says which, how, and what it printed last
+///   a recorder that ends early is news, and the run goes on
 ///
 /// Destroying it ends every process it started and removes its files.
 class Session {
@@ -46,15 +47,20 @@ class Session {
   ///          kUnavailable  a part of the system is gone; the message says which
   Result<jostle_msgs::msg::GoalResult> perform(std::stop_token stop);
 
+  /// Waits until the bag, if one was asked for, has the result and is complete.
+  void finish_recording();
+
  private:
   using Clock = std::chrono::steady_clock;
 
   Session(const RunOptions& options, Watcher watcher, dds::Participant participant, DomainClaim claim,
           std::filesystem::path folder);
 
+  Result<void> start_recorder();
   Result<void> start_processes();
   Result<ChildProcess> start_worker(std::size_t place);  // among the workers
   Result<void> look_after();
+  void look_after_recorder();
   Result<void> check_alive(const std::string& name, ChildProcess& child) const;
   Result<void> check_heard(const std::string& name, Clock::time_point heard) const;
   void listen();
@@ -81,7 +87,7 @@ class Session {
 
   std::vector<ChildProcess> workers_;
   std::vector<Clock::time_point> restarts_;
-  std::optional<ChildProcess> world_process_, coordinator_process_;
+  std::optional<ChildProcess> world_process_, coordinator_process_, recorder_process_;
 };
 
 }  // namespace jostle::services

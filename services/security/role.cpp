@@ -9,7 +9,8 @@ Rights rights_of(Role role) {
     case Role::kRobot: return {.publish = {"*"}, .subscribe = {"*"}};
     // Said topics in full: no pattern of a worker may ever match a robot's topic,
     // whatever namespaces there will be.
-    case Role::kWorker: return {.publish = {"rt/pool/worker", "rt/pool/result"}, .subscribe = {"rt/pool/*"}};
+    case Role::kWorker: return {.publish = {"rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"},
+                                .subscribe = {"rt/pool/*", "rt/doctor/*"}};
     case Role::kObserver: return {.publish = {}, .subscribe = {"*"}};
     case Role::kServer: break;
   }

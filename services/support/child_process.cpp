@@ -8,9 +8,12 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <deque>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <thread>
 #include <utility>
 
@@ -92,17 +95,25 @@ void ChildProcess::terminate() {
   }
 }
 
-void ChildProcess::end() {
-  terminate();
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  while (pid_ > 0 && !ended()) {
-    if (std::chrono::steady_clock::now() >= deadline) {
-      kill(pid_, SIGKILL);
-      wait();
-      return;
-    }
+std::optional<std::string> ChildProcess::wait_for(std::chrono::milliseconds patience) {
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (pid_ > 0 && !ended() && std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
+  return ended_;
+}
+
+bool ChildProcess::has_said(const std::string& text) const {
+  std::ifstream in(log_);
+  const std::string said{std::istreambuf_iterator<char>(in), {}};
+  return said.find(text) != std::string::npos;
+}
+
+void ChildProcess::end() {
+  terminate();
+  if (pid_ < 0 || wait_for(kPatience)) return;
+  kill(pid_, SIGKILL);
+  wait();
 }
 
 std::string ChildProcess::last_words() const {
@@ -115,6 +126,22 @@ std::string ChildProcess::last_words() const {
   std::string text;
   for (const std::string& line : lines) text += "  | " + line + "\n";
   return text;
+}
+
+Result<void> run_tool(const std::string& name, const std::string& package, const std::vector<std::string>& arguments,
+                      const std::filesystem::path& log) {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path ? path : "");
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    const std::filesystem::path program = std::filesystem::path(folder) / name;
+    if (access(program.c_str(), X_OK) != 0) continue;
+    auto child_result = ChildProcess::start(program, arguments, log);
+    if (!child_result) return child_result.error();
+    const std::string end = child_result->wait();
+    if (end == "exit code 0") return {};
+    return Error{Code::kIo, fmt::format("{}: {}\n{}", name, end, child_result->last_words())};
+  }
+  return Error{Code::kNotFound, fmt::format("{}: not found on PATH; install the package {}", name, package)};
 }
 
 }  // namespace jostle::services

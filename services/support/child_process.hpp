@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -36,6 +37,12 @@ class ChildProcess {
   /// Waits until it has ended, and says how.
   std::string wait();
 
+  /// The same, for so long at most.
+  std::optional<std::string> wait_for(std::chrono::milliseconds patience);
+
+  /// Whether it has printed that so far.
+  bool has_said(const std::string& text) const;
+
   /// Asks it to end, without waiting.
   void terminate();
 
@@ -50,5 +57,11 @@ class ChildProcess {
   std::filesystem::path log_;
   std::optional<std::string> ended_;
 };
+
+/// Runs a program of the system to its end; it writes to `log`.
+/// Errors   kNotFound  it is not on PATH; names the Debian package that has it
+///          kIo        it failed; how, and its last words
+Result<void> run_tool(const std::string& name, const std::string& package, const std::vector<std::string>& arguments,
+                      const std::filesystem::path& log);
 
 }  // namespace jostle::services

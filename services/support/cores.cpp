@@ -5,10 +5,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <sstream>
+
+#include "idl/types/number.hpp"
 
 namespace jostle::services {
 namespace {
@@ -27,10 +28,7 @@ std::string ranges_of(const std::vector<int>& cores) {
 }
 
 std::optional<int> parse_core(const std::string& text) {
-  int core = -1;
-  const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), core);
-  if (problem != std::errc() || end != text.data() + text.size() || core < 0 || core >= CPU_SETSIZE) return {};
-  return core;
+  return parse_whole(text, 0, CPU_SETSIZE - 1);
 }
 
 // Version 2's line of /proc/self/cgroup: "0::/the/group".

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -16,6 +17,8 @@
 
 namespace jostle::services {
 namespace {
+
+constexpr std::chrono::milliseconds kTogether{500};
 
 std::stop_source& stop_source() {
   static std::stop_source source;
@@ -41,7 +44,11 @@ StopSignal::StopSignal() {
     int signal = 0;
     sigwait(&set, &signal);
     stop_source().request_stop();
-    // A second one ends a program that does not end by itself.
+    // A second one ends a program that does not end by itself; not one that comes with the
+    // first: timeout(1) sends its signal twice.
+    std::this_thread::sleep_for(kTogether);
+    const timespec at_once{};
+    while (sigtimedwait(&set, nullptr, &at_once) > 0) {}
     pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
     for (;;) pause();
   }).detach();

@@ -24,8 +24,8 @@ enum ExitCode : int {
   kExitInterrupted = 130 ///< Ctrl-C
 };
 
-/// Turns SIGINT and SIGTERM into a stop request for the whole process. Make one
-/// in main before any thread starts.
+/// Turns SIGINT and SIGTERM into a stop request for the whole process. Another one, half a
+/// second later or more, ends it on the spot. Make one in main before any thread starts.
 class StopSignal {
  public:
   StopSignal();

@@ -3,12 +3,6 @@
 #include "services/world_link/messages.hpp"
 
 namespace jostle::services {
-namespace {
-
-enum InHand : std::uint8_t { kNothing, kObject, kCannotTell };
-
-}  // namespace
-
 Journal::Journal(std::string goal_id, double step_duration, std::function<double()> time, Listener listener)
     : goal_id_(std::move(goal_id)),
       step_duration_(step_duration),
@@ -16,17 +10,11 @@ Journal::Journal(std::string goal_id, double step_duration, std::function<double
       listener_(std::move(listener)) {}
 
 void Journal::saw(const std::vector<perception::ObjectReading>& objects) {
-  const double now = time_ ? time_() : 0.0;
-  jostle_msgs::msg::Observation message;
-  message.header(make_header(now));
+  jostle_msgs::msg::Observation message = to_message({reading_, objects}, time_ ? time_() : 0.0);
   message.goal_id(goal_id_);
   message.number(observations_++);
   message.command(std::exchange(command_, {}));
   message.duration(std::exchange(duration_, 0.0));
-  message.q(reading_.q);
-  message.v(reading_.v);
-  message.in_hand(!reading_.object_in_hand ? kCannotTell : *reading_.object_in_hand ? kObject : kNothing);
-  message.objects(to_message(objects, now).objects());
   if (listener_.on_observation) listener_.on_observation(message);
 }
 
@@ -79,12 +67,6 @@ Result<planners::Plan> Journal::Planner::plan(const planners::Problem& problem, 
   auto plan_result = planner_.plan(problem, deadline, std::move(stop));
   if (plan_result) journal_.planned(problem, *plan_result);
   return plan_result;
-}
-
-robot_bridge::RobotReading reading_of(const jostle_msgs::msg::Observation& seen) {
-  robot_bridge::RobotReading reading{.q = seen.q(), .v = seen.v()};
-  if (seen.in_hand() != kCannotTell) reading.object_in_hand = seen.in_hand() == kObject;
-  return reading;
 }
 
 }  // namespace jostle::services

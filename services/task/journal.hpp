@@ -83,7 +83,4 @@ class Journal::Planner final : public planners::Planner {
   planners::Planner& planner_;
 };
 
-/// The robot's part of an observation.
-robot_bridge::RobotReading reading_of(const jostle_msgs::msg::Observation& seen);
-
 }  // namespace jostle::services

@@ -64,6 +64,48 @@ Result<void> check(const perception::ObjectReading& object, std::size_t index) {
   return {};
 }
 
+std::vector<jostle_msgs::msg::ObjectState> to_messages(const std::vector<perception::ObjectReading>& objects) {
+  std::vector<jostle_msgs::msg::ObjectState> states;
+  for (const perception::ObjectReading& object : objects) {
+    jostle_msgs::msg::ObjectState state;
+    state.name(object.name);
+    state.pose(to_pose(object));
+    state.linear(to_vector(object.linear));
+    state.angular(to_vector(object.angular));
+    states.push_back(std::move(state));
+  }
+  return states;
+}
+
+Result<std::vector<perception::ObjectReading>> from_messages(const std::vector<jostle_msgs::msg::ObjectState>& states) {
+  std::vector<perception::ObjectReading> objects;
+  for (const jostle_msgs::msg::ObjectState& state : states) {
+    const auto& p = state.pose().position();
+    const auto& q = state.pose().orientation();
+    objects.push_back({.name = state.name(),
+                       .position = {p.x(), p.y(), p.z()},
+                       .orientation = {q.w(), q.x(), q.y(), q.z()},
+                       .linear = from_vector(state.linear()),
+                       .angular = from_vector(state.angular())});
+    if (auto ok = check(objects.back(), objects.size() - 1); !ok) return ok.error();
+  }
+  return objects;
+}
+
+Result<void> check_finite(const std::vector<double>& q, const std::vector<double>& v) {
+  for (const auto& [field, values] : {std::pair{"q", &q}, std::pair{"v", &v}}) {
+    for (std::size_t i = 0; i < values->size(); ++i) {
+      if (std::isfinite((*values)[i])) continue;
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}[{}]: got {}, wanted a finite number", field, i, (*values)[i])};
+    }
+  }
+  return {};
+}
+
+// Observation.in_hand
+enum InHand : std::uint8_t { kNothing, kObject, kCannotTell };
+
 }  // namespace
 
 std_msgs::msg::Header make_header(double time, const std::string& frame) {
@@ -83,31 +125,13 @@ jostle_msgs::msg::ObjectStates to_message(const std::vector<perception::ObjectRe
                                           double time) {
   jostle_msgs::msg::ObjectStates message;
   message.header(make_header(time));
-  for (const perception::ObjectReading& object : objects) {
-    jostle_msgs::msg::ObjectState state;
-    state.name(object.name);
-    state.pose(to_pose(object));
-    state.linear(to_vector(object.linear));
-    state.angular(to_vector(object.angular));
-    message.objects().push_back(std::move(state));
-  }
+  message.objects(to_messages(objects));
   return message;
 }
 
 Result<std::vector<perception::ObjectReading>> from_message(
     const jostle_msgs::msg::ObjectStates& message) {
-  std::vector<perception::ObjectReading> objects;
-  for (const jostle_msgs::msg::ObjectState& state : message.objects()) {
-    const auto& p = state.pose().position();
-    const auto& q = state.pose().orientation();
-    objects.push_back({.name = state.name(),
-                       .position = {p.x(), p.y(), p.z()},
-                       .orientation = {q.w(), q.x(), q.y(), q.z()},
-                       .linear = from_vector(state.linear()),
-                       .angular = from_vector(state.angular())});
-    if (auto ok = check(objects.back(), objects.size() - 1); !ok) return ok.error();
-  }
-  return objects;
+  return from_messages(message.objects());
 }
 
 sensor_msgs::msg::JointState joint_state_message(const StateLayout& layout, const State& x, double time) {
@@ -142,15 +166,28 @@ tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates&
 }
 
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message) {
-  for (const auto& [field, values] : {std::pair{"q", &message.q()}, std::pair{"v", &message.v()}}) {
-    for (std::size_t i = 0; i < values->size(); ++i) {
-      if (std::isfinite((*values)[i])) continue;
-      return Error{Code::kInvalidArgument,
-                   fmt::format("{}[{}]: got {}, wanted a finite number", field, i, (*values)[i])};
-    }
-  }
+  if (auto ok = check_finite(message.q(), message.v()); !ok) return ok.error();
   return robot_bridge::RobotReading{
       .q = message.q(), .v = message.v(), .object_in_hand = message.object_in_hand()};
+}
+
+jostle_msgs::msg::Observation to_message(const Seen& seen, double time) {
+  jostle_msgs::msg::Observation message;
+  message.header(make_header(time));
+  message.q(seen.robot.q);
+  message.v(seen.robot.v);
+  message.in_hand(!seen.robot.object_in_hand ? kCannotTell : *seen.robot.object_in_hand ? kObject : kNothing);
+  message.objects(to_messages(seen.objects));
+  return message;
+}
+
+Result<Seen> from_message(const jostle_msgs::msg::Observation& message) {
+  if (auto ok = check_finite(message.q(), message.v()); !ok) return ok.error();
+  auto objects_result = from_messages(message.objects());
+  if (!objects_result) return objects_result.error();
+  Seen seen{.robot = {.q = message.q(), .v = message.v()}, .objects = std::move(objects_result).value()};
+  if (message.in_hand() != kCannotTell) seen.robot.object_in_hand = message.in_hand() == kObject;
+  return seen;
 }
 
 }  // namespace jostle::services

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "idl/msg/robot.h"
+#include "idl/msg/task.h"
 #include "idl/types/result.hpp"
 #include "idl/types/state.hpp"
 #include "perception/api/object_source.hpp"
@@ -32,5 +33,16 @@ tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates&
 
 /// Error kInvalidArgument naming the field.
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message);
+
+/// What a controller sees at a time.
+struct Seen {
+  robot_bridge::RobotReading robot;
+  std::vector<perception::ObjectReading> objects;
+};
+
+/// Goal, number and command are left to the caller.
+jostle_msgs::msg::Observation to_message(const Seen& seen, double time);
+/// Error kInvalidArgument naming the field.
+Result<Seen> from_message(const jostle_msgs::msg::Observation& message);
 
 }  // namespace jostle::services

@@ -44,6 +44,10 @@ std::string objection(std::string_view file, std::string_view include) {
   if (is_dds(include) && !in_tests && !starts_with_any(file, {"services/", "idl/convert/", "idl/msg/"})) {
     return "only services/ speaks DDS";
   }
+  if (file.starts_with("services/bag") &&
+      (is_dds(include) || (include.starts_with("services/dds/") && include != "services/dds/qos.hpp"))) {
+    return "bags are files: of DDS they know what a topic promises, which is a plain value";
+  }
   if (is_engine(include) && !in_tests &&
       !starts_with_any(file, {"physics_pool/local/", "physics_pool/render/"})) {
     return "only physics_pool/local and physics_pool/render speak MuJoCo";
@@ -172,6 +176,9 @@ TEST(Objection, IsRaisedForWrongArrowsOnly) {
       {"physics_pool/coarse/learned/forward.cpp", "physics_pool/local/world.hpp", false},
       {"physics_pool/coarse/learned/forward.cpp", "physics_pool/scene/scene.hpp", true},
       {"services/worker/main.cpp", "mujoco/mujoco.h", false},
+      {"services/bag/mcap_writer.cpp", "fastcdr/Cdr.h", false},
+      {"services/bag_cli/info.cpp", "services/dds/participant.hpp", false},
+      {"services/bag/message.hpp", "services/dds/qos.hpp", true},
       {"planners/pbsto/pbsto.cpp", "mujoco.h", false},
       {"planners/pbsto/pbsto.cpp", "physics_pool/api/pool.hpp", true},
       {"planners/pbsto/pbsto.cpp", "physics_pool/local/thread_pool.hpp", false},

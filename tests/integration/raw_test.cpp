@@ -136,6 +136,16 @@ TEST_F(Raw, RetainedSamplesComeToALateReaderInOrder) {
   EXPECT_TRUE(writer.wait_until_received(in(kPatience)));
 }
 
+TEST_F(Raw, ReaderCountsWritersThatOfferTooLittle) {
+  const dds::RawWriter writer(*participant, {kNumbers.name, kNumbers.type, {}});
+  const dds::RawReader sut(*participant, {kNumbers.name, kNumbers.type, {.latched = true, .depth = dds::kKeepAll}},
+                           [](auto, const auto&) {});
+
+  EXPECT_TRUE(soon(kPatience, [&] { return sut.troubles().incompatible == 1; }));
+  EXPECT_EQ(sut.troubles().lost, 0u);
+  EXPECT_EQ(sut.troubles().rejected, 0u);
+}
+
 TEST_F(Raw, KeyedTypesAreTakenWhereTheKeyCanBeFound) {
   const std::string world = "jostle_msgs::msg::dds_::WorldDescription_";
   EXPECT_TRUE(dds::can_be_raw(world, true));

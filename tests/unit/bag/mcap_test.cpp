@@ -254,24 +254,24 @@ TEST_P(DamagedMcap, GivesAnErrorWhereverItIsCutOff) {
 }
 
 TEST_P(DamagedMcap, GivesAnErrorOrTheSameMessagesWhateverByteIsWrong) {
-  int errors = 0, checked = 0;
+  int errors = 0, noticed = 0;
   for (std::size_t at = 0; at < bytes_.size(); ++at) {
-    for (const int flip : {0x01, 0xFF}) {
-      Bytes damaged = bytes_;
-      damaged[at] ^= static_cast<std::byte>(flip);
-      const fs::path file = save(damaged);
-      const auto got = read(file);
-      if (is_error_) ++errors;
-      EXPECT_TRUE(is_error_ || got == wanted_) << "byte " << at << " xor " << flip;
-      EXPECT_LE(recover(file), wanted_.size()) << "byte " << at << " xor " << flip;
-      if (is_error_) continue;
-      // What reading did not meet, verifying may.
-      const auto opened = taken(bag::open_bag(file, false));
-      if (!opened->verify({})) ++checked;
+    // A little and entirely, in turns: both would take twice as long.
+    const auto flip = static_cast<std::byte>(at % 2 == 0 ? 0x01 : 0xFF);
+    Bytes damaged = bytes_;
+    damaged[at] ^= flip;
+    const fs::path file = save(damaged);
+    const auto got = read(file);
+    EXPECT_TRUE(is_error_ || got == wanted_) << "byte " << at;
+    EXPECT_LE(recover(file), wanted_.size()) << "byte " << at;
+    if (is_error_) {
+      ++errors;
+    } else if (!taken(bag::open_bag(file, false))->verify({})) {
+      ++noticed;  // what reading did not meet
     }
   }
-  EXPECT_GT(errors, static_cast<int>(bytes_.size()));
-  EXPECT_GT(checked, 0);
+  EXPECT_GT(errors, static_cast<int>(bytes_.size() / 2));
+  EXPECT_GT(noticed, 0);
 }
 
 TEST_P(DamagedMcap, IsVerifiedToTheLastByteOfItsData) {

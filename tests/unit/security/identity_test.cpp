@@ -61,8 +61,8 @@ TEST_F(IdentityFolder, AsIssuedSaysWhoMayDoWhatUntilWhen) {
   EXPECT_EQ(sut->name, "helper");
   EXPECT_EQ(sut->subject, "CN=helper,OU=worker,O=Jostle");
   EXPECT_EQ(sut->role, Role::kWorker);
-  EXPECT_THAT(sut->rights.publish, ElementsAre("rt/pool/worker", "rt/pool/result"));
-  EXPECT_THAT(sut->rights.subscribe, ElementsAre("rt/pool/*"));
+  EXPECT_THAT(sut->rights.publish, ElementsAre("rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"));
+  EXPECT_THAT(sut->rights.subscribe, ElementsAre("rt/pool/*", "rt/doctor/*"));
   const auto left = sut->not_after - std::chrono::system_clock::now();
   EXPECT_LE(left, 30 * 24h);
   EXPECT_GT(left, 30 * 24h - 15h);  // permissions in local time, see the header

@@ -176,9 +176,9 @@ bool matches(const std::vector<std::string>& patterns, const std::string& topic)
 
 TEST(Roles, LetAWorkerSayResultsAndNothingToARobot) {
   const security::Rights worker = security::rights_of(Role::kWorker);
-  for (const char* topic : {"rt/pool/worker", "rt/pool/result"}) EXPECT_TRUE(matches(worker.publish, topic)) << topic;
+  for (const char* topic : {"rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"}) EXPECT_TRUE(matches(worker.publish, topic)) << topic;
   for (const char* topic : {"rt/robot/command", "rt/x/robot/command", "rt/pool/robot/command", "rt/pool/task/w1",
-                            "rt/pool/world", "rt/pool/control", "rt/task/goal", "rt/tf", "rt/x/pool/result"}) {
+                            "rt/pool/world", "rt/pool/control", "rt/task/goal", "rt/tf", "rt/x/pool/result", "rt/x/doctor/back"}) {
     EXPECT_FALSE(matches(worker.publish, topic)) << topic;
   }
   for (const char* topic : {"rt/pool/world", "rt/pool/control", "rt/pool/task/w0123456789abcdef"}) {

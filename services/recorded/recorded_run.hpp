@@ -3,6 +3,7 @@
 /// RecordedRun: all that decided a task, and what was decided, from a bag.
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "idl/msg/task.h"
@@ -13,6 +14,7 @@ namespace jostle::services {
 
 struct RecordedRun {
   jostle_msgs::msg::TaskRun run;
+  bag::Time begin = 0, end = 0;  ///< when the run was heard of first, and when its result, or the bag's end
   std::vector<jostle_msgs::msg::Observation> observations;  ///< entry i has number i
   std::vector<bag::Time> observed;                          ///< when each was recorded
   std::vector<jostle_msgs::msg::Plan> plans;                ///< entry i has number i
@@ -21,6 +23,10 @@ struct RecordedRun {
   /// Whether it came to an end of its own, rather than being cancelled, timed out or cut off.
   bool concluded() const;
 };
+
+/// The run of a goal, or every run.
+/// Error kNotFound if there is no such goal; names those there are.
+Result<std::vector<RecordedRun>> select_runs(std::vector<RecordedRun> runs, const std::string& goal_id);
 
 /// Every run of a bag, in the order they were taken up. Topics are found by their types,
 /// whatever namespace they are in.

@@ -1,9 +1,9 @@
-#include "services/replay/recorded_run.hpp"
+#include "services/recorded/recorded_run.hpp"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <nlohmann/json.hpp>
+#include <map>
+#include <utility>
 
 #include "services/dds/cdr.hpp"
 
@@ -39,6 +39,7 @@ struct Parts {
   std::map<std::uint32_t, std::pair<Observation, bag::Time>> observations;
   std::map<std::uint32_t, Plan> plans;
   std::optional<GoalResult> result;
+  bag::Time begin = 0, end = 0;
 };
 
 class Collector {
@@ -47,8 +48,10 @@ class Collector {
     if (type == "jostle_msgs/msg/TaskRun") {
       return with<TaskRun>(message, [&](TaskRun run) {
         const std::string id = run.goal().goal_id();
-        if (!parts_[id].run) order_.push_back(id);
+        if (parts_[id].run) return;
+        order_.push_back(id);
         parts_[id].run = std::move(run);
+        parts_[id].begin = message.log_time;
       });
     }
     if (type == "jostle_msgs/msg/Observation") {
@@ -59,7 +62,10 @@ class Collector {
     if (type == "jostle_msgs/msg/Plan") {
       return with<Plan>(message, [&](Plan plan) { parts_[plan.goal_id()].plans.try_emplace(plan.number(), std::move(plan)); });
     }
-    return with<GoalResult>(message, [&](GoalResult result) { parts_[result.goal_id()].result = std::move(result); });
+    return with<GoalResult>(message, [&](GoalResult result) {
+      parts_[result.goal_id()].end = message.log_time;
+      parts_[result.goal_id()].result = std::move(result);
+    });
   }
 
   Result<std::vector<RecordedRun>> runs(const bag::BagInfo& info) const {
@@ -72,6 +78,7 @@ class Collector {
     for (const std::string& id : order_) {
       auto run_result = complete(parts_.at(id), fmt::format("{}: run {}", info.path.string(), id));
       if (!run_result) return run_result.error();
+      if (!run_result->result) run_result->end = info.end;
       runs.push_back(std::move(run_result).value());
     }
     return runs;
@@ -87,7 +94,7 @@ class Collector {
   }
 
   static Result<RecordedRun> complete(const Parts& parts, const std::string& where) {
-    RecordedRun run{.run = *parts.run, .result = parts.result};
+    RecordedRun run{.run = *parts.run, .begin = parts.begin, .end = parts.end, .result = parts.result};
     for (const auto& [number, entry] : parts.observations) {
       if (number != run.observations.size()) return missing(where, "observation", run.observations.size());
       run.observations.push_back(entry.first);
@@ -116,6 +123,15 @@ class Collector {
 bool RecordedRun::concluded() const {
   if (!result || !result->error().empty()) return false;
   return !result->reason().starts_with("timeout") && result->reason() != "cancelled";
+}
+
+Result<std::vector<RecordedRun>> select_runs(std::vector<RecordedRun> runs, const std::string& goal_id) {
+  if (goal_id.empty()) return runs;
+  std::string ids;
+  for (const RecordedRun& run : runs) ids += (ids.empty() ? "" : ", ") + run.run.goal().goal_id();
+  std::erase_if(runs, [&](const RecordedRun& run) { return run.run.goal().goal_id() != goal_id; });
+  if (!runs.empty()) return runs;
+  return Error{Code::kNotFound, fmt::format("--goal: got '{}', wanted one of this bag: {}", goal_id, ids)};
 }
 
 Result<std::vector<RecordedRun>> read_runs(bag::BagReader& reader) {

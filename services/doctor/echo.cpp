@@ -1,0 +1,55 @@
+#include "services/doctor/echo.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace jostle::services {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using jostle_msgs::msg::Goal;
+
+constexpr std::size_t kQueue = 64;
+constexpr std::chrono::milliseconds kGlance{20};  // between two looks at the other direction
+
+// The pool's own promise. Not a robot's topics: every role may say these (services/security/role.cpp).
+const dds::Topic<Goal> kThere{"rt/doctor/there", dds::kTask};
+const dds::Topic<Goal> kBack{"rt/doctor/back", dds::kTask};
+
+}  // namespace
+
+Echo::Echo(const dds::Participant& participant)
+    : back_(participant, kBack), there_(participant, kThere, kQueue), repeater_([this](std::stop_token stop) {
+        while (!stop.stop_requested()) {
+          const auto goal = there_.take(dds::TimePoint::max(), stop);
+          if (!goal) continue;
+          ++heard_;
+          back_.write(*goal);
+        }
+      }) {}
+
+Caller::Caller(const dds::Participant& participant, std::string session)
+    : session_(std::move(session)), there_(participant, kThere), back_(participant, kBack, kQueue) {}
+
+bool Caller::meet(dds::TimePoint deadline) {
+  while (!there_.wait_for_readers(Clock::now() + kGlance) || back_.matched() == 0) {
+    if (Clock::now() >= deadline) return false;
+    if (back_.matched() == 0) back_.take(Clock::now() + kGlance);  // waits: nobody has been asked yet
+  }
+  return true;
+}
+
+std::optional<std::chrono::nanoseconds> Caller::call(std::size_t bytes, dds::TimePoint deadline) {
+  Goal goal;
+  goal.goal_id(fmt::format("{}/{}", session_, calls_++));
+  goal.execution_scene(std::string(bytes, '.'));
+  const auto start = Clock::now();
+  there_.write(goal);
+  while (const auto answer = back_.take(deadline)) {
+    if (answer->goal_id() == goal.goal_id() && answer->execution_scene() == goal.execution_scene()) return Clock::now() - start;
+  }
+  return {};
+}
+
+}  // namespace jostle::services

@@ -1,0 +1,52 @@
+#pragma once
+/// \file
+/// Samples over DDS, there and back: one doctor says them, the other repeats them.
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "services/dds/reader.hpp"
+#include "services/dds/topics.hpp"
+#include "services/dds/writer.hpp"
+
+namespace jostle::services {
+
+/// Repeats what it hears until it is destroyed.
+class Echo {
+ public:
+  /// Throws dds::SetupError.
+  explicit Echo(const dds::Participant& participant);
+
+  int heard() const { return heard_; }
+
+ private:
+  std::atomic<int> heard_{0};
+  dds::Writer<jostle_msgs::msg::Goal> back_;
+  dds::Inbox<jostle_msgs::msg::Goal> there_;
+  std::jthread repeater_;  // last: ends before what it uses is gone
+};
+
+/// The other end.
+class Caller {
+ public:
+  /// `session`: whose answers count. Throws dds::SetupError.
+  Caller(const dds::Participant& participant, std::string session);
+
+  /// Whether both directions found each other by the deadline.
+  bool meet(dds::TimePoint deadline);
+
+  /// Time there and back of a sample of that many bytes; nothing if it did not come back by the deadline.
+  std::optional<std::chrono::nanoseconds> call(std::size_t bytes, dds::TimePoint deadline);
+
+ private:
+  std::string session_;
+  int calls_ = 0;
+  dds::Writer<jostle_msgs::msg::Goal> there_;
+  dds::Inbox<jostle_msgs::msg::Goal> back_;
+};
+
+}  // namespace jostle::services

@@ -1,0 +1,58 @@
+// Writes a bag for check.mjs: FOLDER and mcap, raw or sqlite3.
+
+#include <cstdio>
+#include <cstring>
+#include <string>
+
+#include "services/bag/bag_writer.hpp"
+#include "services/bag/definitions.hpp"
+
+namespace {
+
+using namespace jostle;
+
+constexpr bag::Time kBegin = 1'700'000'000'000'000'000;
+constexpr int kCount = 50'000;  // 5 ms apart: several chunks
+
+std::vector<std::byte> bytes_of(const std::vector<double>& values) {
+  std::vector<std::byte> bytes(4 + 8 * values.size());
+  bytes[1] = std::byte{1};
+  std::memcpy(bytes.data() + 4, values.data(), 8 * values.size());
+  return bytes;
+}
+
+bag::Topic topic(const std::string& name, const std::string& type, const dds::Qos& qos) {
+  return {.name = name, .type = type, .qos = qos, .definition = bag::definition_of(type).value()};
+}
+
+Result<void> write(const std::string& folder, const std::string& kind) {
+  auto writer_result = bag::BagWriter::create(folder, {
+      .storage = kind == "sqlite3" ? bag::BagOptions::Storage::kSqlite : bag::BagOptions::Storage::kMcap,
+      .compress = kind != "raw"});
+  if (!writer_result) return writer_result.error();
+  bag::BagWriter& writer = **writer_result;
+  const auto pose_result = writer.add_topic(topic("/goal", "geometry_msgs/msg/Pose", dds::kLatched));
+  if (!pose_result) return pose_result.error();
+  const auto point_result = writer.add_topic(topic("/hand", "geometry_msgs/msg/Point", dds::kStream));
+  if (!point_result) return point_result.error();
+  const auto unused_result = writer.add_topic(topic("/plan", "jostle_msgs/msg/Plan", dds::kState));
+  if (!unused_result) return unused_result.error();
+  const auto pose = bytes_of({1, 2, 3, 0, 0, 0, 1});
+  if (auto ok = writer.write(*pose_result, {.log_time = kBegin, .publish_time = kBegin - 7, .data = pose}); !ok) return ok;
+  for (int i = 0; i < kCount; ++i) {
+    const bag::Time time = kBegin + bag::Time{i} * 5'000'000;
+    const auto point = bytes_of({static_cast<double>(i), -0.5, 1e-300});
+    if (auto ok = writer.write(*point_result, {.log_time = time, .publish_time = time, .data = point}); !ok) return ok;
+  }
+  writer.set_note("record", {{"command", "jostle record"}, {"host", "ä"}});
+  return writer.close();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) return 2;
+  const auto ok = write(argv[1], argv[2]);
+  if (!ok) std::fprintf(stderr, "%s\n", ok.error().message.c_str());
+  return ok ? 0 : 1;
+}

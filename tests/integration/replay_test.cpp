@@ -1,0 +1,91 @@
+// An experiment from start to end: run, recorded from DDS, decided again, drawn.
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/run_fixture.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+class RecordedRuns : public RunFixture {
+ protected:
+  // Twelve short steps, each re-planned as no plan is good enough, in a world that is not
+  // quite as believed.
+  void record(const std::string& name) {
+    const auto parameters = folder.write("restless.yaml", "planner: {rollouts: 2}\n"
+                                                          "objective: {success_cost: 1.0e-9}\n"
+                                                          "control: {many_iterations: 4, few_iterations_max: 1, initial_steps: 12, "
+                                                          "deviation_threshold: 0, timeout: 120}\n");
+    finish({easy, "--uncertainty", "low", "--seed", "5", "--workers", "2", "--parameters", parameters, "--json",
+            folder.path() / (name + ".json"), "--record", folder.path() / name});
+    ASSERT_TRUE(std::filesystem::exists(folder.path() / name / "metadata.yaml")) << run->err();
+  }
+
+  // Exit code; standard output is in `out`.
+  int program_ends(const std::string& name, const std::vector<std::string>& arguments) {
+    const auto process = program(name, arguments);
+    const int code = process->wait(kPatience).value_or(-1);
+    out = process->out(), err = process->err();
+    return code;
+  }
+
+  std::string bag(const std::string& name) const { return folder.path() / name; }
+
+  std::string out, err;
+};
+
+TEST_F(RecordedRuns, DecideTheSameAgainToTheLastBit) {
+  record("run");
+  const json report = json::parse(contents(folder.path() / "run.json"));
+  ASSERT_GE(report["replans"], 10);
+  const std::string comparison_file = folder.path() / "comparison.json";
+
+  EXPECT_EQ(program_ends("jostle_replay", {bag("run"), "--json", comparison_file}), 0) << out << err;
+
+  EXPECT_THAT(out, HasSubstr("BIT-EQUAL"));
+  const json comparison = json::parse(contents(comparison_file))["runs"][0];
+  EXPECT_EQ(comparison["plans"], report["replans"].get<int>() + 1);
+  EXPECT_EQ(comparison["equal_plans"], comparison["plans"]);
+  EXPECT_EQ(comparison["equal_actions"], comparison["actions"]);
+  EXPECT_GE(comparison["actions"], report["actions"]);  // closing the hand is an action, too
+
+  EXPECT_EQ(program_ends("jostle_replay", {bag("run"), "--set", "planner.rollouts=3"}), 1) << err;
+  EXPECT_THAT(out, HasSubstr("DIFFERS at plan"));
+  EXPECT_THAT(out, HasSubstr("why        planner.rollouts: recorded 2, replayed 3"));
+}
+
+TEST_F(RecordedRuns, AreDrawnAsSheetPicturesAndFilms) {
+  record("run");
+  const auto sheet = folder.path() / "run.png", pictures = folder.path() / "pictures";
+
+  EXPECT_EQ(program_ends("jostle_render", {bag("run"), "-o", sheet, "--frames", "3", "--size", "160x120"}), 0) << err;
+  EXPECT_EQ(program_ends("jostle_render", {bag("run"), "-o", pictures, "--frames", "4", "--size", "160x120"}), 0) << err;
+
+  EXPECT_TRUE(std::filesystem::exists(sheet));
+  EXPECT_TRUE(std::filesystem::exists(pictures / "frame-00004.png"));
+  EXPECT_FALSE(std::filesystem::exists(pictures / "frame-00005.png"));
+  EXPECT_EQ(program_ends("jostle_render", {bag("run"), "-o", folder.path() / "run.avi"}), 1);
+  EXPECT_THAT(err, HasSubstr("wanted .png, .mp4, .gif, or a folder"));
+  for (const std::string name : {"run.mp4", "run.gif"}) {
+    const auto film = folder.path() / name;
+    EXPECT_EQ(program_ends("jostle_render", {bag("run"), "-o", film, "--frames", "5", "--size", "160x120"}), 0) << err;
+    const std::string head = contents(film).substr(0, 12);
+    EXPECT_THAT(head, HasSubstr(name == "run.mp4" ? "ftyp" : "GIF89a"));
+  }
+}
+
+TEST_F(RecordedRuns, WhatIsNoRunIsSaidClearly) {
+  const auto text = folder.write("notes.txt", "no bag");
+  EXPECT_EQ(program_ends("jostle_replay", {text}), 2);
+  EXPECT_THAT(err, HasSubstr("notes.txt"));
+  EXPECT_EQ(program_ends("jostle_replay", {bag("nowhere")}), 2);
+  EXPECT_THAT(err, HasSubstr("nowhere"));
+}
+
+}  // namespace
+}  // namespace jostle::tests

@@ -12,6 +12,7 @@
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <map>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "services/dds/guid.hpp"
@@ -27,7 +28,7 @@ Guid to_guid(const eprosima::fastrtps::rtps::GUID_t& guid);
 
 class Participant::Core {
  public:
-  Core(eprosima::fastdds::dds::DomainParticipant* participant, int domain);
+  Core(eprosima::fastdds::dds::DomainParticipant* participant, int domain, std::string space);
   ~Core();
   Core(const Core&) = delete;
   Core& operator=(const Core&) = delete;
@@ -43,6 +44,7 @@ class Participant::Core {
   eprosima::fastdds::dds::Subscriber* const subscriber;
   const int domain;
   std::shared_ptr<EndpointWatch> watch;  // outlives the participant that calls it
+  const std::string space;  // namespace
 
  private:
   std::mutex mutex_;  // guards users_ and the creation of topics
@@ -101,6 +103,10 @@ inline constexpr int kMostKept = 1 << 16;
 /// What a participant of the profile udp or shared_memory is where the file of profiles does not
 /// say; nothing for other names.
 std::optional<eprosima::fastdds::dds::DomainParticipantQos> built_in_participant(const std::string& profile);
+
+/// Names of the profiles for an endpoint, the first that the file has is in force: of its topic, of
+/// the topic without the namespace, of the topic's kind.
+std::vector<std::string> profiles_for(const Participant::Core& core, const std::string& topic, const Qos& qos);
 
 /// A writer of this Qos where the file of profiles does not say; `apply` is a reader's.
 void apply_to_writer(const Qos& qos, eprosima::fastdds::dds::DataWriterQos& writer);

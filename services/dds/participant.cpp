@@ -190,6 +190,8 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
   auto qos_result = make_qos(options.name);
   if (!qos_result) return qos_result.error();
   DomainParticipantQos& qos = *qos_result;
+  const auto space_result = parse_namespace(environment("JOSTLE_NAMESPACE"));
+  if (!space_result) return space_result.error();
   const std::string way = environment("JOSTLE_DISCOVERY"), identity = options.identity.value_or(environment("JOSTLE_SECURE"));
   auto discovery_result = parse_discovery(way.empty() || server ? "multicast" : way);
   if (!discovery_result) return discovery_result.error();
@@ -213,19 +215,34 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
                  fmt::format("DDS domain {}: no participant could be created; check the network "
                              "interfaces, /dev/shm and the profiles in '{}'", *domain_result, profiles_file().path.string())};
   }
-  auto core = std::make_shared<Core>(participant, *domain_result);
+  auto core = std::make_shared<Core>(participant, *domain_result, *space_result);
   core->watch = options.watch;
   return Participant(std::move(core));
 }
 
 int Participant::domain() const { return core_->domain; }
+const std::string& Participant::space() const { return core_->space; }
+
+std::string Participant::wire_name(const std::string& topic, Scope scope) const {
+  return scope == Scope::kRobot ? in_namespace(core_->space, topic) : topic;
+}
+
+std::vector<std::string> profiles_for(const Participant::Core& core, const std::string& topic, const Qos& qos) {
+  std::vector<std::string> names{topic};
+  const std::string inside = in_namespace(core.space, "rt/");
+  if (topic.starts_with(inside)) names.push_back("rt/" + topic.substr(inside.size()));
+  names.emplace_back(qos.kind);
+  return names;
+}
+
 std::uint64_t Participant::id() const { return participant_id(core_->participant->guid()); }
 
-Participant::Core::Core(DomainParticipant* owned, int domain_id)
+Participant::Core::Core(DomainParticipant* owned, int domain_id, std::string name_space)
     : participant(owned),
       publisher(owned->create_publisher(eprosima::fastdds::dds::PUBLISHER_QOS_DEFAULT)),
       subscriber(owned->create_subscriber(eprosima::fastdds::dds::SUBSCRIBER_QOS_DEFAULT)),
-      domain(domain_id) {}
+      domain(domain_id),
+      space(std::move(name_space)) {}
 
 Participant::Core::~Core() {
   participant->delete_contained_entities();

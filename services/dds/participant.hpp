@@ -11,6 +11,7 @@
 
 #include "idl/types/result.hpp"
 #include "services/dds/discovery.hpp"
+#include "services/dds/names.hpp"
 
 namespace jostle::dds {
 
@@ -44,10 +45,11 @@ struct ServerOptions {
 /// everything may be destroyed in any order.
 ///
 /// The rest comes from the environment, which the programs this one starts inherit; programs
-/// set the first two by the options --discovery and --secure:
+/// set the first three by the options --discovery, --secure and --namespace:
 ///
 ///   JOSTLE_DISCOVERY      see parse_discovery(); else multicast
 ///   JOSTLE_SECURE         identity folder, see security::open_identity(); else unprotected
+///   JOSTLE_NAMESPACE      see parse_namespace(); else none
 ///   JOSTLE_PROFILES       file of transports and QoS, see profiles_file()
 ///   JOSTLE_DDS_TRANSPORT  a participant profile: udp, shared_memory, or one that the file has;
 ///                         `default` is the default profile of FASTRTPS_DEFAULT_PROFILES_FILE,
@@ -60,7 +62,7 @@ struct ServerOptions {
 /// Threads  safe from any thread.
 class Participant {
  public:
-  /// Errors   kInvalidArgument  domain, transport, discovery, profiles or identity; says where it came from
+  /// Errors   kInvalidArgument  domain, transport, discovery, namespace, profiles or identity; says where it came from
   ///          kNotFound, kIo    a host, a file of the identity
   ///          kUnavailable      the middleware refused
   static Result<Participant> open(const ParticipantOptions& options);
@@ -74,6 +76,11 @@ class Participant {
   /// Names this participant in messages: the same number that
   /// WriterBase::matched_participants() gives elsewhere.
   std::uint64_t id() const;
+
+  /// The namespace of its robot's topics; "": none.
+  const std::string& space() const;
+  /// A topic's name with the namespace in it, where the scope asks for it.
+  std::string wire_name(const std::string& topic, Scope scope) const;
 
   /// Names of the participants found so far, as ParticipantOptions::name has them; ours is among them.
   std::vector<std::string> others() const;

@@ -17,12 +17,10 @@ using namespace eprosima::fastdds::dds;
 DataReaderQos reader_qos(const Participant::Core& core, const std::string& topic, const Qos& qos) {
   DataReaderQos result = core.subscriber->get_default_datareader_qos();
   apply(qos, result);
-  if (qos.kind.empty()) return result;
-  // In force instead, if the file has it: the topic's profile, else its kind's.
-  const auto take = [&](const std::string& name) {
-    return core.subscriber->get_datareader_qos_from_profile(name, result) == ReturnCode_t::RETCODE_OK;
-  };
-  take(topic) || take(std::string(qos.kind));
+  // The file's word is in force instead, where it has one.
+  for (const std::string& profile : profiles_for(core, topic, qos)) {
+    if (core.subscriber->get_datareader_qos_from_profile(profile, result) == ReturnCode_t::RETCODE_OK) break;
+  }
   return result;
 }
 

@@ -76,7 +76,7 @@ class Reader : public ReaderBase {
                })) {}
 
   Reader(const Participant& participant, const Topic<T>& topic, OnSampleOf on_sample)
-      : ReaderBase(participant, topic.name, topic.qos,
+      : ReaderBase(participant, participant.wire_name(topic.name, topic.scope), topic.qos,
                    eprosima::fastdds::dds::TypeSupport(new Serializer<T>()),
                    [on_sample = std::move(on_sample)](const void* sample, const Origin& origin) {
                      on_sample(*static_cast<const T*>(sample), origin);

@@ -8,7 +8,7 @@ namespace {
 template <class T>
 SystemTopic describe(const Topic<T>& topic) {
   Serializer<T> serializer;
-  return {{topic.name, serializer.getName(), topic.qos}, serializer.m_isGetKeyDefined};
+  return {{topic.name, serializer.getName(), topic.qos}, serializer.m_isGetKeyDefined, topic.scope};
 }
 
 }  // namespace

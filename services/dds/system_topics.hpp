@@ -11,9 +11,10 @@ namespace jostle::dds {
 
 struct SystemTopic : RawTopic {
   bool keyed = false;
+  Scope scope = Scope::kRobot;
 };
 
-/// Those of topics.hpp, in its order; topics of single workers are not among them.
+/// Those of topics.hpp, in its order, named as without a namespace; topics of single workers are not among them.
 const std::vector<SystemTopic>& system_topics();
 
 }  // namespace jostle::dds

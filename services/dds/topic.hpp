@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "services/dds/names.hpp"
 #include "services/dds/qos.hpp"
 #include "services/dds/types.hpp"
 
@@ -11,8 +12,9 @@ namespace jostle::dds {
 
 template <class T>
 struct Topic {
-  std::string name;  ///< as on the wire: "rt/" before the name that ROS 2 shows
+  std::string name;  ///< as on the wire without a namespace: "rt/" before the name that ROS 2 shows
   Qos qos;
+  Scope scope = Scope::kRobot;
 };
 
 }  // namespace jostle::dds

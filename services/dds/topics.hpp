@@ -30,15 +30,16 @@ inline const Topic<msg::Plan> kTaskPlan{"rt/task/plan", dds::kCommand};
 inline const Topic<msg::Feedback> kTaskFeedback{"rt/task/feedback", dds::kState};
 inline const Topic<msg::GoalResult> kTaskResult{"rt/task/result", dds::kAnswer};
 
-inline const Topic<msg::WorkerHeartbeat> kPoolWorker{"rt/pool/worker", dds::kState};
-inline const Topic<msg::WorldDescription> kPoolWorld{"rt/pool/world", dds::kCatalogue};
-inline const Topic<msg::BatchControl> kPoolControl{"rt/pool/control", dds::kTask};
-inline const Topic<msg::TaskResult> kPoolResult{"rt/pool/result", dds::kTask};
+/// The pool is everybody's, whatever robot they plan for.
+inline const Topic<msg::WorkerHeartbeat> kPoolWorker{"rt/pool/worker", dds::kState, dds::Scope::kDomain};
+inline const Topic<msg::WorldDescription> kPoolWorld{"rt/pool/world", dds::kCatalogue, dds::Scope::kDomain};
+inline const Topic<msg::BatchControl> kPoolControl{"rt/pool/control", dds::kTask, dds::Scope::kDomain};
+inline const Topic<msg::TaskResult> kPoolResult{"rt/pool/result", dds::kTask, dds::Scope::kDomain};
 
 /// Of bags that are played; the clock shows the bag's time.
 inline const Topic<msg::PlayControl> kPlayControl{"rt/play/control", dds::kCommand};
 inline const Topic<msg::PlayStatus> kPlayStatus{"rt/play/status", dds::kLatched};
-inline const Topic<rosgraph_msgs::msg::Clock> kClock{"rt/clock", dds::kState};
+inline const Topic<rosgraph_msgs::msg::Clock> kClock{"rt/clock", dds::kState, dds::Scope::kDomain};
 
 /// All of the above, in their order.
 inline auto all() {
@@ -50,7 +51,7 @@ inline auto all() {
 /// Each worker reads its own: one sample per task on a shared topic would reach
 /// all of them (32 workers: 22.5 ms against 2.7 ms).
 inline Topic<msg::Task> pool_task(std::uint64_t worker) {
-  return {fmt::format("rt/pool/task/w{:016x}", worker), dds::kTask};
+  return {fmt::format("rt/pool/task/w{:016x}", worker), dds::kTask, dds::Scope::kDomain};
 }
 
 }  // namespace jostle::topics

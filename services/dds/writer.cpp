@@ -24,12 +24,10 @@ namespace {
 DataWriterQos writer_qos(const Participant::Core& core, const std::string& topic, const Qos& qos) {
   DataWriterQos result = core.publisher->get_default_datawriter_qos();
   apply_to_writer(qos, result);
-  if (qos.kind.empty()) return result;
-  // In force instead, if the file has it: the topic's profile, else its kind's.
-  const auto take = [&](const std::string& name) {
-    return core.publisher->get_datawriter_qos_from_profile(name, result) == ReturnCode_t::RETCODE_OK;
-  };
-  take(topic) || take(std::string(qos.kind));
+  // The file's word is in force instead, where it has one.
+  for (const std::string& profile : profiles_for(core, topic, qos)) {
+    if (core.publisher->get_datawriter_qos_from_profile(profile, result) == ReturnCode_t::RETCODE_OK) break;
+  }
   return result;
 }
 

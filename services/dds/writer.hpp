@@ -59,7 +59,7 @@ template <class T>
 class Writer : public WriterBase {
  public:
   Writer(const Participant& participant, const Topic<T>& topic)
-      : WriterBase(participant, topic.name, topic.qos,
+      : WriterBase(participant, participant.wire_name(topic.name, topic.scope), topic.qos,
                    eprosima::fastdds::dds::TypeSupport(new Serializer<T>())) {}
 
   /// Sends from the calling thread, tens of microseconds for small messages.

@@ -14,8 +14,8 @@ constexpr std::size_t kQueue = 64;
 constexpr std::chrono::milliseconds kGlance{20};  // between two looks at the other direction
 
 // The pool's own promise. Not a robot's topics: every role may say these (services/security/role.cpp).
-const dds::Topic<Goal> kThere{"rt/doctor/there", dds::kTask};
-const dds::Topic<Goal> kBack{"rt/doctor/back", dds::kTask};
+const dds::Topic<Goal> kThere{"rt/doctor/there", dds::kTask, dds::Scope::kDomain};
+const dds::Topic<Goal> kBack{"rt/doctor/back", dds::kTask, dds::Scope::kDomain};
 
 }  // namespace
 

@@ -24,6 +24,8 @@ constexpr std::uint64_t kLookAtDisk = 16 << 20;      // bytes written before the
 // the writer, even if the writer has found it.
 const dds::RawTopic kTrigger{"rt/record/trigger", "std_msgs::msg::dds_::Empty_", {.depth = dds::kKeepAll}};
 
+constexpr const char* kResultType = "jostle_msgs/msg/GoalResult";  // in whatever namespace
+
 bag::Time wall_clock() {
   const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
   return now.count();
@@ -86,10 +88,6 @@ class Recorder::OpenBag {
 };
 
 Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher watcher) {
-  if (options.until_result && !options.selection.wants(*dds::ros_topic(topics::kTaskResult.name))) {
-    return Error{Code::kInvalidArgument, fmt::format("--until-result: got a selection without {}, wanted one with it",
-                                                     *dds::ros_topic(topics::kTaskResult.name))};
-  }
   std::unique_ptr<Recorder> recorder(new Recorder(std::move(options), std::move(watcher)));
   if (auto ok = recorder->check_disk(); !ok) return Error{Code::kInvalidArgument, ok.error().message};
   const RecordOptions& own = recorder->options_;
@@ -110,6 +108,10 @@ Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher
        .on_warning = recorder->watcher_.on_warning});
   if (!subscriptions_result) return subscriptions_result.error();
   recorder->subscriptions_ = std::move(subscriptions_result).value();
+  if (own.until_result && !recorder->hears_results()) {
+    return Error{Code::kInvalidArgument, fmt::format("--until-result: got a selection without {}, wanted one with it",
+                                                     *dds::ros_topic(topics::kTaskResult.name))};
+  }
   if (writer) {
     writer->set_note("record", own.note);
     writer->set_note("lost", recorder->lost_note());
@@ -137,6 +139,13 @@ Recorder::Recorder(RecordOptions options, Watcher watcher)
 Recorder::~Recorder() {
   trigger_reader_.reset();
   if (subscriptions_) subscriptions_->close();  // its threads call on_sample()
+}
+
+bool Recorder::hears_results() const {
+  for (int topic = 0; topic < topics(); ++topic) {
+    if (subscriptions_->topic(topic).type == kResultType) return true;
+  }
+  return false;
 }
 
 // On the middleware's threads.
@@ -188,7 +197,7 @@ Recorder::Tally& Recorder::tally_of(int topic) {
   if (!std::exchange(tally.known, true)) {
     const bag::Topic known = subscriptions_->topic(topic);
     tally.latched = known.qos.latched;
-    tally.is_result = known.name == dds::ros_topic(topics::kTaskResult.name);
+    tally.is_result = known.type == kResultType;
   }
   return tally;
 }

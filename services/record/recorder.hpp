@@ -106,6 +106,7 @@ class Recorder {
   Recorder(RecordOptions options, Watcher watcher);
 
   void on_sample(int topic, std::span<const std::byte> data, const dds::Origin& origin);
+  bool hears_results() const;
   std::filesystem::path next_folder() const;
   Result<void> take_in(std::vector<QueuedSample> samples);
   Tally& tally_of(int topic);

@@ -73,9 +73,9 @@ struct Subscriptions::Impl {
 
   void start() {
     for (const dds::SystemTopic& topic : dds::system_topics()) {
-      const std::string name = dds::ros_topic(topic.name).value_or("");
-      if (!options.selection.wants(name)) continue;
-      TopicState* state = add(topic.name, topic.type, topic.keyed);
+      const std::string wire_name = participant->wire_name(topic.name, topic.scope);
+      if (!options.selection.wants(dds::ros_topic(wire_name).value_or(""))) continue;
+      TopicState* state = add(wire_name, topic.type, topic.keyed);
       if (!state) continue;
       state->system = true;
       state->topic.qos = topic.qos;

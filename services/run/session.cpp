@@ -29,7 +29,7 @@ Result<std::unique_ptr<Session>> Session::start(const RunOptions& options, Watch
   auto participant_result = dds::Participant::open({.name = "jostle_run", .domain = options.domain});
   if (!participant_result) return participant_result.error();
   // Two that start at once would each hear the other's processes and take them for their own.
-  auto claim_result = DomainClaim::take("run", participant_result->domain(), std::chrono::seconds(1));
+  auto claim_result = DomainClaim::take("run", participant_result->domain(), std::chrono::seconds(1), participant_result->space());
   if (!claim_result) return claim_result.error();
   auto folder_result = make_temporary_folder("run");
   if (!folder_result) return folder_result.error();
@@ -198,7 +198,7 @@ Result<void> Session::send_goal() {
   if (others_heard_ || found.size() > 1) {
     return Error{Code::kUnavailable,
                  fmt::format("domain {}: got another coordinator beside ours, wanted none; another run uses "
-                             "this domain, set ROS_DOMAIN_ID to a free one", participant_.domain())};
+                             "this domain, set ROS_DOMAIN_ID to a free one, or --namespace to one of its own", participant_.domain())};
   }
   const bool answers = found.size() == 1 && feedback_.last_writer() == found.front() &&
                        std::ranges::binary_search(results_.matched_participants(), found.front());

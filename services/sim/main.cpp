@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
   auto participant_result = dds::Participant::open(participant_options);
   if (!participant_result) return fail(participant_result.error(), kExitUsage);
   // Before it says a word.
-  const auto claim_result = DomainClaim::take("simulated world", participant_result->domain(), std::chrono::seconds(1));
+  const auto claim_result = DomainClaim::take("simulated world", participant_result->domain(), std::chrono::seconds(1), participant_result->space());
   if (!claim_result) return fail(claim_result.error(), kExitBroken);
 
   try {

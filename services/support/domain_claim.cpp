@@ -18,7 +18,8 @@ constexpr std::chrono::milliseconds kRetry{20};
 
 }  // namespace
 
-Result<DomainClaim> DomainClaim::take(const std::string& role, int domain, std::chrono::milliseconds patience) {
+Result<DomainClaim> DomainClaim::take(const std::string& role, int domain, std::chrono::milliseconds patience,
+                                      const std::string& space) {
   const int handle = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const auto failed = [&](const char* what) {
     return Error{Code::kUnavailable, fmt::format("domain {}: the claim to be its only {} could not be made: {}: {}",
@@ -28,15 +29,16 @@ Result<DomainClaim> DomainClaim::take(const std::string& role, int domain, std::
   DomainClaim claim(handle);
   sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
   // A leading zero: a name in the kernel, not a file.
-  const std::string name = fmt::format("jostle/{}/{}", domain, role);
+  const std::string name = fmt::format("jostle/{}/{}{}{}", domain, role, space.empty() ? "" : " of ", space);
   name.copy(address.sun_path + 1, sizeof(address.sun_path) - 1);
   const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
   const auto deadline = std::chrono::steady_clock::now() + patience;
   while (bind(handle, reinterpret_cast<const sockaddr*>(&address), length) != 0) {
     if (errno != EADDRINUSE) return failed("bind");
     if (std::chrono::steady_clock::now() >= deadline) {
-      return Error{Code::kUnavailable, fmt::format("domain {}: got another {} on this machine, wanted none; "
-                                                   "set ROS_DOMAIN_ID to a free one", domain, role)};
+      return Error{Code::kUnavailable, fmt::format("domain {}: got another {} on this machine{}, wanted none; set ROS_DOMAIN_ID "
+                                                   "to a free one, or --namespace to one of its own", domain, role,
+                                                   space.empty() ? "" : " in namespace " + space)};
     }
     std::this_thread::sleep_for(kRetry);
   }

@@ -9,16 +9,17 @@
 
 namespace jostle::services {
 
-/// A role that only one process of a machine may have on a DDS domain. Held
+/// A role that only one process of a machine may have on a DDS domain, or in a namespace of it. Held
 /// until it is destroyed or the process ends, however it ends.
 ///
 /// A bound socket without a file: there is nothing to clean up, and it reaches
 /// exactly as far as loopback traffic does, the network namespace.
 class DomainClaim {
  public:
-  /// `role`: a few words. Waits up to `patience` for a predecessor that is just ending.
+  /// `role`: a few words; `space`: the namespace it is in, "" for none. Waits up to `patience` for a predecessor that is just ending.
   /// Error kUnavailable if another process has the role.
-  static Result<DomainClaim> take(const std::string& role, int domain, std::chrono::milliseconds patience);
+  static Result<DomainClaim> take(const std::string& role, int domain, std::chrono::milliseconds patience,
+                                  const std::string& space = "");
 
   DomainClaim(DomainClaim&& other) noexcept;
   DomainClaim& operator=(DomainClaim&& other) noexcept;

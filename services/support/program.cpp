@@ -76,6 +76,9 @@ void add_network_options(CLI::App& app) {
   app.add_option_function<std::string>("--discovery", sets("JOSTLE_DISCOVERY"),
                                        "How processes find each other: multicast, peers:HOST,HOST,... or\n"
                                        "server:HOST[:PORT] (default: JOSTLE_DISCOVERY, else multicast)");
+  app.add_option_function<std::string>("--namespace", sets("JOSTLE_NAMESPACE"),
+                                       "Of the robot's topics, such as left: several robots then share a domain and its\n"
+                                       "workers (default: JOSTLE_NAMESPACE, else none)");
   app.add_option_function<std::string>("--secure", sets("JOSTLE_SECURE"),
                                        "Identity folder made by `jostle keys` (default: JOSTLE_SECURE, else unprotected)");
 }

@@ -42,8 +42,8 @@ void wait_for(std::stop_token stop);
 /// if that has happened already. `parent`: its process id; 0 does nothing.
 void die_with_parent(pid_t parent);
 
-/// --discovery and --secure, of every program that speaks DDS. They set JOSTLE_DISCOVERY and
-/// JOSTLE_SECURE of this process: so whatever it starts joins in the same way.
+/// --discovery, --namespace and --secure, of every program that speaks DDS. They set JOSTLE_DISCOVERY,
+/// JOSTLE_NAMESPACE and JOSTLE_SECURE of this process: so whatever it starts joins in the same way.
 void add_network_options(CLI::App& app);
 
 /// What every process of a run can be told, add_network_options() included.

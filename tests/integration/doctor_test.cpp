@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tests/support/hosts.hpp"
+#include "services/support/hosts.hpp"
 #include "tests/support/program_process.hpp"
 #include "tests/support/worker_process.hpp"
 
@@ -14,6 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using nlohmann::json;
+using services::Hosts;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -26,7 +27,7 @@ class Doctor : public ::testing::Test {
  protected:
   std::unique_ptr<ProgramProcess> on(int host, const std::string& name, const std::vector<std::string>& arguments) {
     std::unique_ptr<ProgramProcess> process;
-    hosts.on(host, [&] { process = std::make_unique<ProgramProcess>(name, arguments, folder); });
+    hosts->on(host, [&] { process = std::make_unique<ProgramProcess>(name, arguments, folder); });
     return process;
   }
 
@@ -78,7 +79,11 @@ class Doctor : public ::testing::Test {
     EXPECT_THAT(check(names.front())["remedy"].get<std::string>(), HasSubstr(remedy));
   }
 
-  const Hosts hosts{2};
+  const std::unique_ptr<Hosts> hosts = [] {
+    auto hosts_result = Hosts::make(2);
+    if (!hosts_result) throw std::runtime_error(hosts_result.error().message);
+    return std::move(hosts_result).value();
+  }();
   const TempFolder folder;
   std::unique_ptr<ProgramProcess> listener;
   json checks;
@@ -112,7 +117,7 @@ TEST_F(Doctor, FindsNothingWrongThroughAServer) {
 
 TEST_F(Doctor, NamesACableThatIsOut) {
   listen();
-  hosts.plug(kThere, false);
+  hosts->plug(kThere, false);
   ask();
   expect_failed({"peer"}, "10.77.0.2 (10.77.0.2), TCP port 11812: No route to host", "cables, addresses");
 }
@@ -125,7 +130,7 @@ TEST_F(Doctor, NamesADoctorThatDoesNotListen) {
 TEST_F(Doctor, NamesBlockedMulticast) {
   for (const int host : {kHere, kThere}) {
     // Nobody there can join a group.
-    hosts.on(host, [] { std::ofstream("/proc/sys/net/ipv4/igmp_max_memberships") << 0 << std::flush; });
+    hosts->on(host, [] { std::ofstream("/proc/sys/net/ipv4/igmp_max_memberships") << 0 << std::flush; });
   }
   listen();
   ask();
@@ -182,7 +187,7 @@ TEST_F(Doctor, KnowsIdentities) {
 
 TEST_F(Doctor, SurvivesWhateverComesToItsDoor) {
   listen();
-  hosts.on(kHere, [] {
+  hosts->on(kHere, [] {
     // Lines that are no JSON, no question, of wrong types; then rubbish without an end.
     ASSERT_EQ(std::system("for text in rubbish '{}' '{\"ask\":7}' '{\"ask\":\"send\",\"port\":-1}' '{\"ask\":\"heard\",\"text\":[],\"size\":-1}'; "
                           "do bash -c \"exec 3<>/dev/tcp/10.77.0.2/11812; echo '$text' >&3; exec 3>&-\"; done; "

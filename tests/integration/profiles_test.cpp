@@ -246,7 +246,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "<transport_id>: got 'tcp', wanted"},
         Mistake{"BadLease", "<sec>2<", "<sec>two<", "<sec>: got 'two', wanted"},
         Mistake{"UnknownKind", "profile_name=\"task\"", "profile_name=\"tsak\"",
-                "<data_writer>: got 'tsak', wanted one of: task, answer, latched, stream, state, catalogue; or a topic"},
+                "<data_writer>: got 'tsak', wanted one of: task, command, answer, latched, stream, state, catalogue; or a topic"},
         Mistake{"Twice", "profile_name=\"answer\"", "profile_name=\"task\"", "<data_writer>: got 'task' again, wanted each name once"},
         Mistake{"NoName", " profile_name=\"task\"", "", "<data_writer>: got no name, wanted profile_name"},
         Mistake{"NeverMeet", "<kind>RELIABLE</kind>", "<kind>BEST_EFFORT</kind>",

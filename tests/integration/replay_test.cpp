@@ -59,6 +59,15 @@ TEST_F(RecordedRuns, DecideTheSameAgainToTheLastBit) {
   EXPECT_THAT(out, HasSubstr("why        planner.rollouts: recorded 2, replayed 3"));
 }
 
+TEST_F(RecordedRuns, AreWholeEvenIfTheRecorderCameLate) {
+  start_acting(2);
+  EXPECT_EQ(program_ends("jostle_record", {"--output", bag("late"), "--until-result"}), 0) << err;
+  ASSERT_TRUE(run->wait(kPatience)) << run->err();
+
+  EXPECT_EQ(program_ends("jostle_replay", {bag("late")}), 0) << out << err;
+  EXPECT_THAT(out, HasSubstr("BIT-EQUAL"));
+}
+
 TEST_F(RecordedRuns, AreDrawnAsSheetPicturesAndFilms) {
   record("run");
   const auto sheet = folder.path() / "run.png", pictures = folder.path() / "pictures";

@@ -27,6 +27,7 @@ struct Benchmark {
 
 constexpr auto kBenchmarks = std::to_array<Benchmark>({
     {"bag", "messages into a bag against bare appends of the same bytes", 7, measure_bag},
+    {"play", "a bag as a subscriber hears it against the bag, at rates from 0.1 to 10", 3, measure_play},
     {"pool-threads", "ThreadPool against bare loops of engine steps", 15, measure_pool_threads},
     {"pool-dds", "two worker processes against two bare loops", 15, measure_pool_dds},
     {"round-trip", "an empty task through the pool against a bare Fast DDS echo", 25, measure_round_trip},

@@ -33,7 +33,8 @@ Result<std::vector<fs::path>> files_in(const fs::path& folder) {
   }
   if (problem) return Error{Code::kIo, fmt::format("{}: cannot be read: {}", folder.string(), problem.message())};
   if (files.empty()) {
-    return Error{Code::kInvalidArgument, fmt::format("{}: got a folder without .mcap or .db3 files, wanted a bag", folder.string())};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: got a folder without .mcap or .db3 files, wanted a bag", folder.string())};
   }
   std::ranges::sort(files, {}, file_rank);
   return files;
@@ -223,7 +224,8 @@ class FolderReader final : public CheckedReader {
 
 std::optional<int> BagReader::find_topic(const std::string& name) const {
   const auto& topics = info().topics;
-  const auto topic = std::ranges::find(topics, name, [](const TopicInfo& other) -> const std::string& { return other.topic.name; });
+  const auto topic =
+      std::ranges::find(topics, name, [](const TopicInfo& other) -> const std::string& { return other.topic.name; });
   if (topic == topics.end()) return {};
   return static_cast<int>(topic - topics.begin());
 }

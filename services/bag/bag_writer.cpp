@@ -57,7 +57,9 @@ class FolderWriter final : public BagWriter {
     open.sequence = counted.sequence;
     if (!file_start_) file_start_ = message.log_time;
     if (open.topic.qos.latched && may_split()) {
-      open.last = Message{.topic = topic, .publish_time = counted.publish_time, .sequence = counted.sequence,
+      open.last = Message{.topic = topic,
+                          .publish_time = counted.publish_time,
+                          .sequence = counted.sequence,
                           .data = {message.data.begin(), message.data.end()}};
     }
     return {};
@@ -65,10 +67,17 @@ class FolderWriter final : public BagWriter {
 
   Result<void> flush() override {
     if (failure_) return *failure_;
-    return keep_failure(file_->flush());
+    auto flushed = keep_failure(file_->flush(changed_notes_));
+    if (flushed) changed_notes_.clear();
+    return flushed;
   }
 
-  void set_note(const std::string& name, Note note) override { notes_[name] = std::move(note); }
+  void set_note(const std::string& name, Note note) override {
+    const auto known = notes_.find(name);
+    if (known != notes_.end() && known->second == note) return;
+    changed_notes_[name] = note;
+    notes_[name] = std::move(note);
+  }
 
   Result<void> close() override {
     if (std::exchange(is_closed_, true)) return {};
@@ -89,6 +98,7 @@ class FolderWriter final : public BagWriter {
     if (!file_result) return file_result.error();
     file_ = std::move(*file_result);
     entries_.push_back({.path = name});
+    changed_notes_ = notes_;
     for (const OpenTopic& open : topics_) {
       if (auto ok = file_->add_topic(open.topic); !ok) return ok;
     }
@@ -134,7 +144,7 @@ class FolderWriter final : public BagWriter {
 
   Result<void> end_file() {
     if (!file_) return {};
-    auto closed = file_->close(notes_);
+    auto closed = file_->close(changed_notes_);
     const WrittenFile written = file_->written();
     MetadataEntry& entry = entries_.back();
     entry.start = written.start;
@@ -166,6 +176,7 @@ class FolderWriter final : public BagWriter {
   std::vector<OpenTopic> topics_;
   std::vector<MetadataEntry> entries_;
   Notes notes_;
+  Notes changed_notes_;  // that the present file has not, or has older
   std::uint64_t bytes_before_ = 0;
 };
 

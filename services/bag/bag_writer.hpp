@@ -51,7 +51,7 @@ class BagWriter {
   /// Hands everything written so far to the operating system: it survives this process.
   virtual Result<void> flush() = 0;
 
-  /// Stored under `name` when the present file is closed, in this file and those that follow.
+  /// Stored under `name` by the next flush() or close(), and in all files that follow.
   virtual void set_note(const std::string& name, Note note) = 0;
 
   /// Index, statistics, notes, metadata.yaml.

@@ -27,12 +27,13 @@ constexpr std::array<std::pair<std::string_view, Basic>, 14> kBasics{{
     {"uint64", Basic::kU64}, {"int64", Basic::kI64}, {"float32", Basic::kF32}, {"float64", Basic::kF64},
     {"string", Basic::kString}}};
 
+// Of strings and messages: at least.
 constexpr std::size_t size_of(Basic basic) {
   switch (basic) {
     case Basic::kU16: case Basic::kI16: return 2;
     case Basic::kU32: case Basic::kI32: case Basic::kF32: return 4;
     case Basic::kU64: case Basic::kI64: case Basic::kF64: return 8;
-    default: return 1;  // of strings and messages: at least
+    default: return 1;
   }
 }
 
@@ -96,22 +97,30 @@ struct Decoder::Types {
     }
     for (std::size_t part = 0; part < parts.size(); ++part) {
       for (const Line& line : parts[part]) {
-        if (line.words.size() < 2) return malformed(type, line.number, fmt::format("got '{}', wanted a type and a name", line.words[0]));
+        if (line.words.size() < 2) {
+          return malformed(type, line.number, fmt::format("got '{}', wanted a type and a name", line.words[0]));
+        }
         // NAME=value, NAME = value: constants are not on the wire.
-        if (line.words[1].find('=') != std::string::npos || (line.words.size() > 2 && line.words[2].starts_with('='))) continue;
+        if (line.words[1].find('=') != std::string::npos || (line.words.size() > 2 && line.words[2].starts_with('='))) {
+          continue;
+        }
         auto field_result = parse_field(type, types[part].name, line.words[0], line.words[1], line.number);
         if (!field_result) return field_result.error();
         types[part].fields.push_back(std::move(*field_result));
       }
     }
-    std::vector<int> states(types.size(), 0);
-    return check_ends(type, 0, states);
+    std::vector<int> depths(types.size(), 0);
+    if (auto depth_result = depth_of(type, 0, 1, depths); !depth_result) return depth_result.error();
+    return {};
   }
 
-  Result<Field> parse_field(const std::string& whole, const std::string& owner, std::string type, const std::string& name, int line) const {
+  Result<Field> parse_field(const std::string& whole, const std::string& owner, std::string type,
+                            const std::string& name, int line) const {
     Field field{.name = name};
     if (const std::size_t open = type.find('['); open != std::string::npos) {
-      if (type.back() != ']') return malformed(whole, line, fmt::format("got type '{}', wanted an array that ends with ]", type));
+      if (type.back() != ']') {
+        return malformed(whole, line, fmt::format("got type '{}', wanted an array that ends with ]", type));
+      }
       const std::string inside = type.substr(open + 1, type.size() - open - 2);
       field.is_sequence = inside.empty() || inside.starts_with("<=");
       if (!field.is_sequence) {
@@ -129,27 +138,44 @@ struct Decoder::Types {
         return field;
       }
     }
-    if (type == "time" || type == "duration") type = type == "time" ? "builtin_interfaces/Time" : "builtin_interfaces/Duration";
+    if (type == "time" || type == "duration") {
+      type = type == "time" ? "builtin_interfaces/Time" : "builtin_interfaces/Duration";
+    }
     if (type == "Header") type = "std_msgs/Header";
     type = short_name(type);
     if (type.find('/') == std::string::npos) type = owner.substr(0, owner.find('/') + 1) + type;
     const auto part = std::ranges::find(types, type, &MessageType::name);
-    if (part == types.end()) return malformed(whole, line, fmt::format("got type {}, wanted a basic one or one that the definition has", type));
+    if (part == types.end()) {
+      return malformed(whole, line,
+                       fmt::format("got type {}, wanted a basic one or one that the definition has", type));
+    }
     field.basic = Basic::kMessage;
     field.message = static_cast<std::size_t>(part - types.begin());
     return field;
   }
 
-  // A type that contains itself would have no end.
-  Result<void> check_ends(const std::string& whole, std::size_t type, std::vector<int>& states) const {
-    states[type] = 1;
-    for (const Field& field : types[type].fields) {
-      if (field.basic != Basic::kMessage || states[field.message] == 2) continue;
-      if (states[field.message] == 1) return malformed(whole, 1, fmt::format("{} contains itself", types[field.message].name));
-      if (auto ok = check_ends(whole, field.message, states); !ok) return ok;
+  // How many types deep a type nests, known ones in `depths`. One that contains itself would have
+  // no end, and decoding calls itself for each.
+  Result<int> depth_of(const std::string& whole, std::size_t type, int level, std::vector<int>& depths) const {
+    constexpr int kDeepest = 100, kUnknown = 0, kUnderWay = -1;
+    if (level > kDeepest) {
+      return malformed(whole, 1, fmt::format("got types nested {} deep, wanted at most {}", level, kDeepest));
     }
-    states[type] = 2;
-    return {};
+    depths[type] = kUnderWay;
+    int depth = 0;
+    for (const Field& field : types[type].fields) {
+      if (field.basic != Basic::kMessage) continue;
+      int& known = depths[field.message];
+      if (known == kUnderWay) return malformed(whole, 1, fmt::format("{} contains itself", types[field.message].name));
+      if (known == kUnknown) {
+        if (auto depth_result = depth_of(whole, field.message, level + 1, depths); !depth_result) return depth_result;
+      }
+      depth = std::max(depth, known);
+    }
+    if (level + depth > kDeepest) {
+      return malformed(whole, 1, fmt::format("got types nested {} deep, wanted at most {}", level + depth, kDeepest));
+    }
+    return depths[type] = depth + 1;
   }
 };
 
@@ -169,7 +195,9 @@ class CdrReader {
       if (!problem_.empty()) break;
       const std::size_t path_size = path_.size();
       path_ += (path_.empty() ? "" : ".") + field.name;
-      object[field.name] = field.is_sequence ? many(field, sequence_length(field)) : field.count > 0 ? many(field, field.count) : value(field);
+      object[field.name] = field.is_sequence ? many(field, sequence_length(field))
+                           : field.count > 0 ? many(field, field.count)
+                                             : value(field);
       path_.resize(path_size);
     }
     return object;
@@ -203,7 +231,8 @@ class CdrReader {
   std::size_t sequence_length(const Field& field) {
     const auto count = number<std::uint32_t>();
     if (count > left() / size_of(field.basic)) {
-      fail(fmt::format("got a length of {}, wanted at most {}, for which there are bytes", count, left() / size_of(field.basic)));
+      fail(fmt::format("got a length of {}, wanted at most {}, for which there are bytes", count,
+                       left() / size_of(field.basic)));
       return 0;
     }
     return count;
@@ -262,15 +291,22 @@ Result<Decoder> Decoder::create(const std::string& type, const std::string& defi
 
 Result<Json> Decoder::decode(std::span<const std::byte> cdr) const {
   const std::string& name = types_->types.front().name;
-  if (cdr.size() < 4) return Error{Code::kInvalidArgument, fmt::format("{}: got {} bytes, wanted 4 or more", name, cdr.size())};
+  if (cdr.size() < 4) {
+    return Error{Code::kInvalidArgument, fmt::format("{}: got {} bytes, wanted 4 or more", name, cdr.size())};
+  }
   const auto kind = static_cast<unsigned>(cdr[0]) << 8 | static_cast<unsigned>(cdr[1]);
-  if (kind > 1) return Error{Code::kInvalidArgument, fmt::format("{}: byte 0: got encapsulation {:04x}, wanted 0000 or 0001 (plain CDR)", name, kind)};
+  if (kind > 1) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: byte 0: got encapsulation {:04x}, wanted 0000 or 0001 (plain CDR)", name, kind)};
+  }
   const bool is_little = kind == 1;
   CdrReader reader(cdr.subspan(4), is_little != (std::endian::native == std::endian::little), types_->types);
   Json object = reader.message(0);
   if (!reader.problem().empty()) return Error{Code::kInvalidArgument, fmt::format("{}: {}", name, reader.problem())};
   // Writers may fill up to a multiple of their alignment.
-  if (reader.left() >= 8) return Error{Code::kInvalidArgument, fmt::format("{}: got {} bytes more than the type has", name, reader.left())};
+  if (reader.left() >= 8) {
+    return Error{Code::kInvalidArgument, fmt::format("{}: got {} bytes more than the type has", name, reader.left())};
+  }
   return object;
 }
 

@@ -66,7 +66,10 @@ std::vector<Token> tokens_of(std::string_view text) {
       at = end_of_line;
       continue;
     } else if (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_') {
-      while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) != 0 || text[end] == '_' || text[end] == ':')) ++end;
+      while (end < text.size() &&
+             (std::isalnum(static_cast<unsigned char>(text[end])) != 0 || text[end] == '_' || text[end] == ':')) {
+        ++end;
+      }
     }
     token.text = std::string(text.substr(at, end - at));
     if (token.is_comment) token.text = "//";
@@ -138,7 +141,8 @@ class IdlParser {
   }
   void fail(const Token& token, const std::string& wanted) {
     if (error_) return;
-    error_ = Error{Code::kInvalidArgument, fmt::format("{}: line {}: got '{}', wanted {}", file_, token.line, token.text, wanted)};
+    error_ = Error{Code::kInvalidArgument,
+                   fmt::format("{}: line {}: got '{}', wanted {}", file_, token.line, token.text, wanted)};
   }
 
   void parse_package() {
@@ -210,7 +214,8 @@ class IdlParser {
     const std::size_t end_of_package = name.find("::msg::");
     if (end_of_package != std::string::npos) {
       field.type = name.substr(0, end_of_package) + "/" + name.substr(end_of_package + 7);
-    } else if (name.find(':') == std::string::npos && !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) != 0) {
+    } else if (name.find(':') == std::string::npos && !name.empty() &&
+               std::isalpha(static_cast<unsigned char>(name[0])) != 0) {
       field.type = package_ + "/" + name;
     } else {
       fail(first, "a type");
@@ -232,7 +237,8 @@ std::string text_of(const Struct& message) {
   for (const std::string& comment : message.comments) text += "# " + comment + "\n";
   for (const Field& field : message.fields) {
     for (const std::string& comment : field.comments_before) text += "# " + comment + "\n";
-    text += fmt::format("{}{} {}{}{}\n", field.type, field.array, field.name, field.comment.empty() ? "" : "  # ", field.comment);
+    text += fmt::format("{}{} {}{}{}\n", field.type, field.array, field.name, field.comment.empty() ? "" : "  # ",
+                        field.comment);
   }
   return text;
 }
@@ -242,7 +248,8 @@ Result<void> collect_parts(const Structs& structs, const std::string& name, std:
   for (const Field& field : structs.at(name).fields) {
     if (!field.is_ours || std::ranges::find(parts, field.type) != parts.end()) continue;
     if (!structs.contains(field.type)) {
-      return Error{Code::kInvalidArgument, fmt::format("{}: {}: got type {}, wanted one that the files have", name, field.name, field.type)};
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}: {}: got type {}, wanted one that the files have", name, field.name, field.type)};
     }
     parts.push_back(field.type);
     if (auto ok = collect_parts(structs, field.type, parts); !ok) return ok;

@@ -41,8 +41,8 @@ Result<std::vector<std::byte>> InputFile::read(std::uint64_t offset, std::uint64
   std::vector<std::byte> bytes(static_cast<std::size_t>(count));
   std::size_t filled = 0;
   while (filled < bytes.size()) {
-    const ssize_t got = ::pread(descriptor_, bytes.data() + filled, bytes.size() - filled,
-                                static_cast<off_t>(offset + filled));
+    const ssize_t got =
+        ::pread(descriptor_, bytes.data() + filled, bytes.size() - filled, static_cast<off_t>(offset + filled));
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) {
       return Error{Code::kIo, fmt::format("{}: cannot be read at byte {}: {}", path_.string(), offset + filled,

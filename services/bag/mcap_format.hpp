@@ -24,7 +24,7 @@ using Bytes = std::vector<std::byte>;
 using View = std::span<const std::byte>;
 
 inline constexpr std::array<unsigned char, 8> kMagic{0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
-inline constexpr std::size_t kRecordHead = 9;  ///< opcode and length
+inline constexpr std::size_t kRecordHead = 9;    ///< opcode and length
 inline constexpr std::size_t kMessageHead = 22;  ///< of a Message's body, before its data
 inline constexpr std::size_t kFooterRecord = kRecordHead + 20;
 
@@ -147,12 +147,12 @@ struct ChunkHead {
   std::uint64_t size = 0;            ///< of the records, not compressed
   std::uint32_t crc = 0;             ///< of the same; 0: not given
   std::string compression;
-  std::uint64_t stored = 0;          ///< bytes of the records as they are in the file
+  std::uint64_t stored = 0;  ///< bytes of the records as they are in the file
 };
 
 struct ChunkIndex {
   std::uint64_t start = 0, end = 0;
-  std::uint64_t offset = 0, length = 0;  ///< of the chunk's record in the file
+  std::uint64_t offset = 0, length = 0;                    ///< of the chunk's record in the file
   std::map<std::uint16_t, std::uint64_t> message_indexes;  ///< offsets in the file, by channel
   std::uint64_t message_index_length = 0;
   std::string compression;

@@ -57,7 +57,9 @@ struct Record {
   std::uint64_t end() const { return body() + size; }
 };
 
-bool has_magic(View bytes) { return bytes.size() == kMagic.size() && std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) == 0; }
+bool has_magic(View bytes) {
+  return bytes.size() == kMagic.size() && std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) == 0;
+}
 
 class McapReader final : public FileReader {
  public:
@@ -161,8 +163,9 @@ class McapReader final : public FileReader {
       const std::uint64_t got = other.counts_.contains(channel) ? other.counts_[channel] : 0;
       const std::uint64_t wanted = claimed.contains(channel) ? claimed[channel] : 0;
       if (got != wanted) {
-        return damaged(file_.size(), fmt::format("topic {}: got {} messages, wanted {} as the statistics say",
-                                                 info_.topics[static_cast<std::size_t>(topic)].topic.name, got, wanted));
+        return damaged(file_.size(),
+                       fmt::format("topic {}: got {} messages, wanted {} as the statistics say",
+                                   info_.topics[static_cast<std::size_t>(topic)].topic.name, got, wanted));
       }
     }
     return {};
@@ -186,12 +189,14 @@ class McapReader final : public FileReader {
     const auto* bytes = reinterpret_cast<const unsigned char*>(magic_result->data());
     if (magic_result->size() == kMagic.size() && std::equal(bytes, bytes + 5, kMagic.begin()) && bytes[5] > kMagic[5] &&
         bytes[6] == '\r' && bytes[7] == '\n') {
-      return Error{Code::kInvalidArgument, fmt::format("{}: got MCAP of version {:c}, wanted 0: a later program wrote it",
-                                                       file_.path().string(), bytes[5])};
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}: got MCAP of version {:c}, wanted 0: a later program wrote it",
+                               file_.path().string(), bytes[5])};
     }
     if (magic_result->empty()) return damaged(0, "the file is empty");
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}: byte 0: got something else, wanted the beginning of an MCAP file", file_.path().string())};
+    return Error{
+        Code::kInvalidArgument,
+        fmt::format("{}: byte 0: got something else, wanted the beginning of an MCAP file", file_.path().string())};
   }
 
   void forget() {
@@ -234,7 +239,8 @@ class McapReader final : public FileReader {
     const auto footer = parse_footer(tail.subspan(kRecordHead, kFooterRecord - kRecordHead));
     if (!has_magic(tail.last(kMagic.size())) || op != Op::kFooter ||
         head.number<std::uint64_t>() != kFooterRecord - kRecordHead || !footer) {
-      return damaged(file_.size(), "cut off: the file does not end as MCAP does (its writer was killed, or the disk was full)");
+      return damaged(file_.size(),
+                     "cut off: the file does not end as MCAP does (its writer was killed, or the disk was full)");
     }
     if (footer->summary_start == 0) return scan(footer_at);
     return read_summary(*footer, footer_at);
@@ -272,7 +278,10 @@ class McapReader final : public FileReader {
           break;
         case Op::kChunkIndex: {
           const auto index = parse_chunk_index(body);
-          if (!index) { ok = false; break; }
+          if (!index) {
+            ok = false;
+            break;
+          }
           if (auto added = add_block(*index, record.offset); !added) return added;
           break;
         }
@@ -282,15 +291,15 @@ class McapReader final : public FileReader {
           if (ok) metadata.push_back(std::move(*index));
           break;
         }
-        default: break;  // what says nothing about messages, or comes from a later version
+        default:
+          break;  // what says nothing about messages, or comes from a later version
       }
       if (!ok) return damaged(record.offset, "a record of the summary is malformed");
       at = record.end();
     }
     // Without counts, or with messages outside of chunks, only a look at all records helps.
-    const bool is_complete =
-        statistics && statistics->chunks == blocks_.size() &&
-        (statistics->messages == 0 || (!statistics->channel_messages.empty() && !blocks_.empty()));
+    const bool is_complete = statistics && statistics->chunks == blocks_.size() &&
+                             (statistics->messages == 0 || (!statistics->channel_messages.empty() && !blocks_.empty()));
     if (!is_complete) {
       blocks_.clear();
       return scan(footer_at);
@@ -306,15 +315,21 @@ class McapReader final : public FileReader {
     const std::uint64_t head = kRecordHead + chunk_head_size(index.compression);
     if (index.offset > file_.size() || index.length > file_.size() - index.offset || index.length < head ||
         index.stored != index.length - head) {
-      return damaged(record_offset, fmt::format("chunk index: got a chunk of {} bytes at byte {}, wanted one that lies in the file",
-                                                index.length, index.offset));
+      return damaged(record_offset,
+                     fmt::format("chunk index: got a chunk of {} bytes at byte {}, wanted one that lies in the file",
+                                 index.length, index.offset));
     }
     const auto start_result = time_of(index.start, record_offset);
     const auto end_result = time_of(index.end, record_offset);
     if (!start_result) return start_result.error();
     if (!end_result) return end_result.error();
-    Block block{.offset = index.offset, .length = index.length, .stored = index.stored, .size = index.size,
-                .compression = index.compression, .start = *start_result, .end = *end_result,
+    Block block{.offset = index.offset,
+                .length = index.length,
+                .stored = index.stored,
+                .size = index.size,
+                .compression = index.compression,
+                .start = *start_result,
+                .end = *end_result,
                 .knows_channels = !index.message_indexes.empty()};
     for (const auto& [channel, offset] : index.message_indexes) block.channels[channel] = 0;
     blocks_.push_back(std::move(block));
@@ -323,11 +338,14 @@ class McapReader final : public FileReader {
 
   Result<void> read_metadata(const MetadataIndex& index, std::uint64_t end) {
     if (index.offset > end || index.length > end - index.offset) {
-      return damaged(index.offset, fmt::format("metadata '{}': got {} bytes, wanted them to lie in the file", index.name, index.length));
+      return damaged(index.offset, fmt::format("metadata '{}': got {} bytes, wanted them to lie in the file",
+                                               index.name, index.length));
     }
     auto record_result = record_at(index.offset, end);
     if (!record_result) return record_result.error();
-    if (record_result->op != Op::kMetadata) return damaged(index.offset, fmt::format("got another record, wanted metadata '{}'", index.name));
+    if (record_result->op != Op::kMetadata) {
+      return damaged(index.offset, fmt::format("got another record, wanted metadata '{}'", index.name));
+    }
     return take_metadata(*record_result);
   }
 
@@ -356,19 +374,23 @@ class McapReader final : public FileReader {
     if (!channel) return damaged(offset, "a channel is malformed");
     if (topics_.contains(channel->id)) return {};
     if (channel->encoding != kMessageEncoding) {
-      return Error{Code::kInvalidArgument, fmt::format("{}: topic {}: got messages encoded as '{}', wanted '{}'",
-                                                       file_.path().string(), channel->topic, channel->encoding, kMessageEncoding)};
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}: topic {}: got messages encoded as '{}', wanted '{}'", file_.path().string(),
+                               channel->topic, channel->encoding, kMessageEncoding)};
     }
     const auto schema = schemas_.find(channel->schema);
     if (channel->schema != 0 && schema == schemas_.end()) {
-      return damaged(offset, fmt::format("topic {}: got schema {}, wanted one that the file has", channel->topic, channel->schema));
+      return damaged(offset, fmt::format("topic {}: got schema {}, wanted one that the file has", channel->topic,
+                                         channel->schema));
     }
     Topic topic{.name = channel->topic};
     if (schema != schemas_.end()) {
       topic.type = schema->second.name;
       if (schema->second.encoding == kSchemaEncoding) topic.definition = schema->second.data;
     }
-    if (const auto qos = channel->metadata.find(kQosKey); qos != channel->metadata.end()) topic.qos = parse_qos(qos->second);
+    if (const auto qos = channel->metadata.find(kQosKey); qos != channel->metadata.end()) {
+      topic.qos = parse_qos(qos->second);
+    }
     // Several channels may be one topic: several writers, or a recording that was merged.
     const auto known = std::ranges::find_if(info_.topics, [&](const TopicInfo& other) {
       return other.topic.name == topic.name && other.topic.type == topic.type;
@@ -428,8 +450,13 @@ class McapReader final : public FileReader {
     const auto end_result = time_of(head->end, record.offset);
     if (!start_result) return start_result.error();
     if (!end_result) return end_result.error();
-    Block block{.offset = record.offset, .length = record.end() - record.offset, .stored = head->stored,
-                .size = head->size, .compression = head->compression, .start = *start_result, .end = *end_result};
+    Block block{.offset = record.offset,
+                .length = record.end() - record.offset,
+                .stored = head->stored,
+                .size = head->size,
+                .compression = head->compression,
+                .start = *start_result,
+                .end = *end_result};
     auto records_result = records_of(block);
     if (!records_result) return records_result.error();
     return take_block(std::move(block), *records_result);
@@ -468,7 +495,9 @@ class McapReader final : public FileReader {
       crc = crc32_of(*piece_result, crc);
       at += count;
     }
-    if (crc != wanted) return damaged(record.offset, fmt::format("data: got checksum {:08x}, wanted {:08x}", crc, wanted));
+    if (crc != wanted) {
+      return damaged(record.offset, fmt::format("data: got checksum {:08x}, wanted {:08x}", crc, wanted));
+    }
     return {};
   }
 
@@ -479,7 +508,8 @@ class McapReader final : public FileReader {
     const View data = View(*body_result).first(body_result->size() - sizeof(std::uint32_t));
     const auto wanted = Parser(View(*body_result).last(sizeof(std::uint32_t))).number<std::uint32_t>();
     if (wanted != 0 && crc32_of(data) != wanted) {
-      return damaged(record.offset, fmt::format("attachment: got checksum {:08x}, wanted {:08x}", crc32_of(data), wanted));
+      return damaged(record.offset,
+                     fmt::format("attachment: got checksum {:08x}, wanted {:08x}", crc32_of(data), wanted));
     }
     return {};
   }
@@ -500,7 +530,9 @@ class McapReader final : public FileReader {
     std::ranges::sort(got);
     const auto wanted = last_chunk_.find(channel);
     if (wanted == last_chunk_.end() ? !got.empty() : got != wanted->second) {
-      return damaged(record.offset, fmt::format("message index of channel {}: it tells of other messages than the chunk has", channel));
+      return damaged(
+          record.offset,
+          fmt::format("message index of channel {}: it tells of other messages than the chunk has", channel));
     }
     return {};
   }
@@ -517,7 +549,8 @@ class McapReader final : public FileReader {
       const auto time_result = time_of(head->log_time, block.offset);
       if (!time_result) return time_result.error();
       if (!topics_.contains(head->channel)) {
-        return damaged_in(block, offset, fmt::format("got a message of channel {}, wanted one that the file has", head->channel));
+        return damaged_in(block, offset,
+                          fmt::format("got a message of channel {}, wanted one that the file has", head->channel));
       }
       earliest = std::min(earliest, *time_result);
       latest = std::max(latest, *time_result);
@@ -566,7 +599,8 @@ class McapReader final : public FileReader {
                                                chunk->stored, chunk->size));
     }
     if (chunk->crc != 0 && crc32_of(*records) != chunk->crc) {
-      return damaged(block.offset, fmt::format("chunk: got checksum {:08x}, wanted {:08x}", crc32_of(*records), chunk->crc));
+      return damaged(block.offset,
+                     fmt::format("chunk: got checksum {:08x}, wanted {:08x}", crc32_of(*records), chunk->crc));
     }
     return std::move(*records);
   }
@@ -598,13 +632,19 @@ class McapReader final : public FileReader {
       const auto head = parse_message(body);
       if (!head) return damaged_in(block, offset, "a message is malformed");
       const auto topic = topics_.find(head->channel);
-      if (topic == topics_.end()) return damaged_in(block, offset, fmt::format("got a message of channel {}, wanted one that the file has", head->channel));
+      if (topic == topics_.end()) {
+        return damaged_in(block, offset,
+                          fmt::format("got a message of channel {}, wanted one that the file has", head->channel));
+      }
       const auto time_result = time_of(head->log_time, block.offset);
       if (!time_result) return time_result.error();
       if (*time_result < block.start || *time_result > block.end) {
-        return damaged_in(block, offset, fmt::format("got log time {}, wanted one of {} to {} as the chunk says", *time_result, block.start, block.end));
+        return damaged_in(block, offset,
+                          fmt::format("got log time {}, wanted one of {} to {} as the chunk says", *time_result,
+                                      block.start, block.end));
       }
-      loaded.entries.push_back({.log_time = *time_result, .offset = offset + kRecordHead, .size = body.size(), .topic = topic->second});
+      loaded.entries.push_back(
+          {.log_time = *time_result, .offset = offset + kRecordHead, .size = body.size(), .topic = topic->second});
       return {};
     });
     if (!ok) return ok.error();
@@ -617,8 +657,11 @@ class McapReader final : public FileReader {
     const View body = View(loaded.records).subspan(entry.offset, entry.size);
     const auto head = *parse_message(body);
     const View data = body.subspan(kMessageHead);
-    return {.topic = entry.topic, .log_time = entry.log_time, .publish_time = static_cast<Time>(head.publish_time),
-            .sequence = head.sequence, .data = Bytes(data.begin(), data.end())};
+    return {.topic = entry.topic,
+            .log_time = entry.log_time,
+            .publish_time = static_cast<Time>(head.publish_time),
+            .sequence = head.sequence,
+            .data = Bytes(data.begin(), data.end())};
   }
 
   bool may_have(const Block& block, int topic) const {
@@ -657,7 +700,9 @@ class McapReader final : public FileReader {
   // Puts a block's next wanted message, from `entry` on, among the cursors.
   bool advance(std::size_t index, std::size_t entry) {
     const auto& entries = loaded_[index].entries;
-    while (entry < entries.size() && !wanted_.empty() && !wanted_[static_cast<std::size_t>(entries[entry].topic)]) ++entry;
+    while (entry < entries.size() && !wanted_.empty() && !wanted_[static_cast<std::size_t>(entries[entry].topic)]) {
+      ++entry;
+    }
     if (entry == entries.size()) return false;
     cursors_.push({.log_time = entries[entry].log_time, .block = index, .entry = entry});
     return true;
@@ -686,7 +731,8 @@ class McapReader final : public FileReader {
 
   Result<void> finish() {
     // A chunk without messages has no times.
-    std::erase_if(blocks_, [](const Block& block) { return block.is_chunk && block.knows_channels && block.channels.empty(); });
+    std::erase_if(blocks_,
+                  [](const Block& block) { return block.is_chunk && block.knows_channels && block.channels.empty(); });
     std::ranges::sort(blocks_, {}, &Block::offset);
     by_start_.resize(blocks_.size());
     for (std::size_t i = 0; i < by_start_.size(); ++i) by_start_[i] = i;
@@ -708,8 +754,8 @@ class McapReader final : public FileReader {
 
   InputFile file_;
   const OpenOptions options_;
-  bool recovers_ = false;   // steps over damage
-  bool verifies_ = false;   // scan() looks at what reading does not need, too
+  bool recovers_ = false;  // steps over damage
+  bool verifies_ = false;  // scan() looks at what reading does not need, too
   FileInfo info_;
   std::map<std::uint16_t, Schema> schemas_;
   std::map<std::uint16_t, int> topics_;  // by channel
@@ -718,15 +764,15 @@ class McapReader final : public FileReader {
   /// Of the chunk that verify() saw last: log times and offsets by channel, sorted.
   std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> last_chunk_;
 
-  std::vector<Block> blocks_;           // as they lie in the file
-  std::vector<std::size_t> by_start_;   // blocks in the order of their beginnings
-  std::vector<Time> latest_end_;        // of by_start_ up to each
+  std::vector<Block> blocks_;          // as they lie in the file
+  std::vector<std::size_t> by_start_;  // blocks in the order of their beginnings
+  std::vector<Time> latest_end_;       // of by_start_ up to each
 
   Time from_ = std::numeric_limits<Time>::min();
   std::vector<bool> wanted_;
-  std::size_t next_block_ = 0;              // of by_start_
-  std::priority_queue<Cursor> cursors_;     // the next message of every loaded block
-  std::map<std::size_t, Loaded> loaded_;    // by block
+  std::size_t next_block_ = 0;            // of by_start_
+  std::priority_queue<Cursor> cursors_;   // the next message of every loaded block
+  std::map<std::size_t, Loaded> loaded_;  // by block
 
   std::size_t kept_ = std::numeric_limits<std::size_t>::max();  // block that last_at() has at hand
   Loaded kept_block_;

@@ -42,13 +42,17 @@ class McapWriter final : public FileWriter {
     }
     const auto [schema, is_new] = schemas_.try_emplace({topic.type, topic.definition}, schemas_.size() + 1);
     if (is_new) {
-      const Schema record{.id = schema->second, .name = topic.type,
-                          .encoding = topic.definition.empty() ? "" : kSchemaEncoding, .data = topic.definition};
+      const Schema record{.id = schema->second,
+                          .name = topic.type,
+                          .encoding = topic.definition.empty() ? "" : kSchemaEncoding,
+                          .data = topic.definition};
       append(pending_, record);
       append(schema_records_, record);
     }
-    const Channel record{.id = static_cast<std::uint16_t>(channels_.size()), .schema = schema->second,
-                         .topic = topic.name, .encoding = kMessageEncoding,
+    const Channel record{.id = static_cast<std::uint16_t>(channels_.size()),
+                         .schema = schema->second,
+                         .topic = topic.name,
+                         .encoding = kMessageEncoding,
                          .metadata = {{kQosKey, qos_text(topic.qos)}}};
     append(pending_, record);
     append(channel_records_, record);
@@ -73,8 +77,10 @@ class McapWriter final : public FileWriter {
     return chunk_.size() < kChunkBytes ? Result<void>() : close_chunk();
   }
 
-  Result<void> flush() override {
+  // A note that changes is written again: of several under one name the last one counts.
+  Result<void> flush(const Notes& notes) override {
     if (failure_) return *failure_;
+    for (const auto& [name, note] : notes) append_metadata({.name = name, .metadata = note}, pending_);
     return close_chunk();
   }
 
@@ -82,7 +88,7 @@ class McapWriter final : public FileWriter {
     // In front of the chunk that it speaks of, so that it is there whenever the chunk is.
     const Metadata record{.name = kRepeatedNote, .metadata = {{"chunks", "1"}}};
     append_metadata(record, pending_);
-    return flush();
+    return flush({});
   }
 
   Result<void> close(const Notes& notes) override {
@@ -111,8 +117,7 @@ class McapWriter final : public FileWriter {
 
   // `crc`: of all pieces, which are `size` long together.
   Result<void> put(std::initializer_list<View> pieces, std::uint32_t crc, std::size_t size) {
-    const std::uint64_t room =
-        schema_records_.size() + channel_records_.size() + index_records_.size() + kRoomForNotes;
+    const std::uint64_t room = schema_records_.size() + channel_records_.size() + index_records_.size() + kRoomForNotes;
     auto ok = file_.append(pieces, room);
     if (!ok) {
       failure_ = ok.error();
@@ -147,11 +152,19 @@ class McapWriter final : public FileWriter {
         compression = "zstd";
       }
     }
-    const ChunkHead head{.start = chunk_start_, .end = chunk_end_, .size = chunk_.size(), .crc = chunk_crc,
-                         .compression = compression, .stored = stored.size()};
-    ChunkIndex index{.start = head.start, .end = head.end, .offset = file_.size() + pending_.size(),
+    const ChunkHead head{.start = chunk_start_,
+                         .end = chunk_end_,
+                         .size = chunk_.size(),
+                         .crc = chunk_crc,
+                         .compression = compression,
+                         .stored = stored.size()};
+    ChunkIndex index{.start = head.start,
+                     .end = head.end,
+                     .offset = file_.size() + pending_.size(),
                      .length = kRecordHead + chunk_head_size(compression) + stored.size(),
-                     .compression = compression, .stored = stored.size(), .size = head.size};
+                     .compression = compression,
+                     .stored = stored.size(),
+                     .size = head.size};
     head_ = pending_;
     append(head_, head);
     tail_.clear();
@@ -161,8 +174,7 @@ class McapWriter final : public FileWriter {
     }
     index.message_index_length = tail_.size();
     const std::uint32_t stored_crc = compression.empty() ? chunk_crc : crc32_of(stored);
-    const std::uint32_t crc =
-        crc32_of(tail_, crc32_of_both(crc32_of(head_), stored_crc, stored.size()));
+    const std::uint32_t crc = crc32_of(tail_, crc32_of_both(crc32_of(head_), stored_crc, stored.size()));
     auto ok = put({head_, stored, tail_}, crc, head_.size() + stored.size() + tail_.size());
     if (ok) {
       pending_.clear();
@@ -235,8 +247,8 @@ class McapWriter final : public FileWriter {
   std::vector<std::uint16_t> in_chunk_;  // channels with messages in it
   std::uint32_t crc_ = 0;                // of the file so far
 
-  std::map<std::pair<std::string, std::string>, std::uint16_t> schemas_;  // type, definition -> id
-  std::vector<WrittenChannel> channels_;                                  // by id, which is the topic
+  std::map<std::pair<std::string, std::string>, std::uint16_t> schemas_;       // type, definition -> id
+  std::vector<WrittenChannel> channels_;                                       // by id, which is the topic
   Bytes schema_records_, channel_records_, index_records_, metadata_records_;  // of the summary
   Statistics statistics_;
 };

@@ -93,9 +93,11 @@ Result<ReadMetadata> read_metadata(const std::filesystem::path& folder) {
       return Error{Code::kInvalidArgument, fmt::format("{}: got no {}, wanted rosbag2's", file.string(), kRoot)};
     }
     if (const auto compression = root["compression_format"].as<std::string>(""); !compression.empty()) {
-      return Error{Code::kInvalidArgument,
-                   fmt::format("{}: got a bag that rosbag2 compressed ({}, {} mode), wanted plain files; remedy: ros2 bag convert",
-                               file.string(), compression, root["compression_mode"].as<std::string>("?"))};
+      return Error{
+          Code::kInvalidArgument,
+          fmt::format(
+              "{}: got a bag that rosbag2 compressed ({}, {} mode), wanted plain files; remedy: ros2 bag convert",
+              file.string(), compression, root["compression_mode"].as<std::string>("?"))};
     }
     ReadMetadata metadata{.storage = root["storage_identifier"].as<std::string>("")};
     for (const YAML::Node& path : root["relative_file_paths"]) {
@@ -106,11 +108,13 @@ Result<ReadMetadata> read_metadata(const std::filesystem::path& folder) {
       metadata.files.push_back(std::move(found));
     }
     if (metadata.files.empty()) {
-      return Error{Code::kInvalidArgument, fmt::format("{}: relative_file_paths: got none, wanted the files of the bag", file.string())};
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}: relative_file_paths: got none, wanted the files of the bag", file.string())};
     }
     return metadata;
   } catch (const YAML::Exception& problem) {
-    return Error{Code::kInvalidArgument, fmt::format("{}: line {}: {}", file.string(), problem.mark.line + 1, problem.msg)};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: line {}: {}", file.string(), problem.mark.line + 1, problem.msg)};
   }
 }
 

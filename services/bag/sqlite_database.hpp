@@ -23,11 +23,13 @@ class Statement {
   void bind(int parameter, std::int64_t value) { sqlite3_bind_int64(statement_.get(), parameter, value); }
   /// What is bound is not copied: it stays where it is until the statement is reset.
   void bind(int parameter, std::string_view text) {
-    sqlite3_bind_text64(statement_.get(), parameter, text.data() == nullptr ? "" : text.data(), text.size(), SQLITE_STATIC, SQLITE_UTF8);
+    sqlite3_bind_text64(statement_.get(), parameter, text.data() == nullptr ? "" : text.data(), text.size(),
+                        SQLITE_STATIC, SQLITE_UTF8);
   }
   void bind(int parameter, std::span<const std::byte> bytes) {
-    sqlite3_bind_blob64(statement_.get(), parameter, bytes.data() == nullptr ? "" : static_cast<const void*>(bytes.data()),
-                        bytes.size(), SQLITE_STATIC);
+    sqlite3_bind_blob64(statement_.get(), parameter,
+                        bytes.data() == nullptr ? "" : static_cast<const void*>(bytes.data()), bytes.size(),
+                        SQLITE_STATIC);
   }
 
   /// Whether there is a (further) row.
@@ -57,8 +59,9 @@ class Database {
   /// A new one, to be written.
   static Result<Database> create(const std::filesystem::path& file);
   /// One that is there. Rolls back what a killed writer has left half done, as every program
-  /// that opens it does.
-  static Result<Database> open(const std::filesystem::path& file);
+  /// that opens it does. `recover`: one whose last pages are missing, too,
+  /// unless a page is cut in two.
+  static Result<Database> open(const std::filesystem::path& file, bool recover);
 
   Result<void> run(const std::string& sql);
   Result<Statement> prepare(const std::string& sql) const;

@@ -46,7 +46,8 @@ class SqliteReader final : public FileReader {
       if (!*row_result) break;
       const auto topic = topics_.find(rows_->number(0));
       if (topic == topics_.end()) {
-        const Error error = damaged(fmt::format("messages: got one of topic {}, wanted a topic that the file has", rows_->number(0)));
+        const Error error =
+            damaged(fmt::format("messages: got one of topic {}, wanted a topic that the file has", rows_->number(0)));
         if (stepped_over(error)) continue;
         return ended(error);
       }
@@ -62,7 +63,8 @@ class SqliteReader final : public FileReader {
     if (span.first > time) return std::optional<Message>();
     // The index is of times alone: where the topic's last message is known, go there at once.
     auto statement_result = database_.prepare(
-        "SELECT topic_id, timestamp, data FROM messages WHERE topic_id = ? AND timestamp <= ? AND timestamp >= ? AND id > ? "
+        "SELECT topic_id, timestamp, data FROM messages WHERE topic_id = ? AND timestamp <= ? AND timestamp >= ? AND "
+        "id > ? "
         "ORDER BY timestamp DESC, id DESC LIMIT 1");
     if (!statement_result) return statement_result.error();
     statement_result->bind(1, ids_.at(static_cast<std::size_t>(topic)));
@@ -109,16 +111,18 @@ class SqliteReader final : public FileReader {
     if (!database_.has_table("topics") || !database_.has_table("messages")) {
       // Nothing at all may be seen of a damaged one.
       if (auto rows = database_.value("SELECT count(*) FROM sqlite_master"); !rows) return rows.error();
-      return Error{Code::kInvalidArgument, fmt::format("{}: got another database, wanted a bag of rosbag2: no tables topics and messages",
-                                                       database_.path().string())};
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}: got another database, wanted a bag of rosbag2: no tables topics and messages",
+                               database_.path().string())};
     }
     if (!database_.has_table("schema")) return {};
     auto version_result = database_.value("SELECT schema_version FROM schema");
     if (!version_result) return version_result.error();
     const std::string text = version_result->value_or("0");
     if (std::atoi(text.c_str()) > kNewestVersion) {
-      return Error{Code::kInvalidArgument, fmt::format("{}: got version {} of the schema, wanted at most {}: a later program wrote it",
-                                                       database_.path().string(), text, kNewestVersion)};
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}: got version {} of the schema, wanted at most {}: a later program wrote it",
+                               database_.path().string(), text, kNewestVersion)};
     }
     return {};
   }
@@ -126,15 +130,17 @@ class SqliteReader final : public FileReader {
   Result<void> read_topics() {
     // Not by the version's number: some writers of version 4 have fewer columns than it says.
     const bool has_qos = database_.has_column("topics", "offered_qos_profiles");
-    auto topics_result = database_.prepare(fmt::format("SELECT id, name, type, serialization_format{} FROM topics ORDER BY id",
-                                                       has_qos ? ", offered_qos_profiles" : ""));
+    auto topics_result =
+        database_.prepare(fmt::format("SELECT id, name, type, serialization_format{} FROM topics ORDER BY id",
+                                      has_qos ? ", offered_qos_profiles" : ""));
     if (!topics_result) return topics_result.error();
     Result<bool> row = true;
     while ((row = topics_result->step()) && *row) {
       Topic topic{.name = topics_result->text(1), .type = topics_result->text(2)};
       if (const std::string format = topics_result->text(3); format != kMessageEncoding) {
-        return Error{Code::kInvalidArgument, fmt::format("{}: topic {}: got messages encoded as '{}', wanted '{}'",
-                                                         database_.path().string(), topic.name, format, kMessageEncoding)};
+        return Error{Code::kInvalidArgument,
+                     fmt::format("{}: topic {}: got messages encoded as '{}', wanted '{}'", database_.path().string(),
+                                 topic.name, format, kMessageEncoding)};
       }
       if (has_qos) topic.qos = parse_qos(topics_result->text(4));
       const std::int64_t id = topics_result->number(0);
@@ -148,7 +154,8 @@ class SqliteReader final : public FileReader {
   }
 
   Result<void> read_definitions() {
-    auto rows_result = database_.prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions");
+    auto rows_result =
+        database_.prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions");
     if (!rows_result) return rows_result.error();
     Result<bool> row = true;
     while ((row = rows_result->step()) && *row) {
@@ -185,7 +192,8 @@ class SqliteReader final : public FileReader {
     rows_result->bind(1, repeated_);
     Result<bool> row = true;
     while ((row = rows_result->step()) && *row) {
-      add(rows_result->number(0), static_cast<std::uint64_t>(rows_result->number(1)), rows_result->number(2), rows_result->number(3));
+      add(rows_result->number(0), static_cast<std::uint64_t>(rows_result->number(1)), rows_result->number(2),
+          rows_result->number(3));
     }
     if (!row) return row.error();
     return {};
@@ -193,7 +201,8 @@ class SqliteReader final : public FileReader {
 
   // As far as the table can be read.
   Result<void> count_one_by_one() {
-    auto rows_result = database_.prepare("SELECT topic_id, timestamp, data, id FROM messages NOT INDEXED WHERE id > ? ORDER BY id");
+    auto rows_result =
+        database_.prepare("SELECT topic_id, timestamp, data, id FROM messages NOT INDEXED WHERE id > ? ORDER BY id");
     if (!rows_result) return rows_result.error();
     rows_result->bind(1, repeated_);
     Result<bool> row = true;
@@ -224,12 +233,12 @@ class SqliteReader final : public FileReader {
       if (wanted_[i]) wanted.push_back(ids_[i]);
     }
     const bool is_filtered = wanted.size() < ids_.size() && !wanted_.empty();
-    auto rows_result = database_.prepare(fmt::format(
-        "SELECT topic_id, timestamp, data FROM messages {} WHERE timestamp >= ? AND id > ?{} ORDER BY {}",
-        // The index may be what is damaged.
-        options_.recover ? "NOT INDEXED" : "",
-        is_filtered ? fmt::format(" AND topic_id IN ({})", fmt::join(wanted, ",")) : "",
-        options_.recover ? "id" : "timestamp, id"));
+    auto rows_result = database_.prepare(
+        fmt::format("SELECT topic_id, timestamp, data FROM messages {} WHERE timestamp >= ? AND id > ?{} ORDER BY {}",
+                    // The index may be what is damaged.
+                    options_.recover ? "NOT INDEXED" : "",
+                    is_filtered ? fmt::format(" AND topic_id IN ({})", fmt::join(wanted, ",")) : "",
+                    options_.recover ? "id" : "timestamp, id"));
     if (!rows_result) return rows_result.error();
     rows_result->bind(1, from_);
     rows_result->bind(2, repeated_);
@@ -239,16 +248,17 @@ class SqliteReader final : public FileReader {
 
   static Message message_of(const Statement& row, int topic) {
     const auto data = row.bytes(2);
-    return {.topic = topic, .log_time = row.number(1), .publish_time = row.number(1), .data = {data.begin(), data.end()}};
+    return {
+        .topic = topic, .log_time = row.number(1), .publish_time = row.number(1), .data = {data.begin(), data.end()}};
   }
 
   Database database_;
   const OpenOptions options_;
   FileInfo info_;
-  std::vector<std::int64_t> ids_;        // in the database, by topic
-  std::map<std::int64_t, int> topics_;   // the other way round
-  std::vector<Span> spans_;              // log times, by topic
-  std::int64_t repeated_ = 0;            // messages up to this one are left out
+  std::vector<std::int64_t> ids_;       // in the database, by topic
+  std::map<std::int64_t, int> topics_;  // the other way round
+  std::vector<Span> spans_;             // log times, by topic
+  std::int64_t repeated_ = 0;           // messages up to this one are left out
   Time from_ = std::numeric_limits<Time>::min();
   std::vector<bool> wanted_;
   std::optional<Statement> rows_;
@@ -258,7 +268,7 @@ class SqliteReader final : public FileReader {
 }  // namespace
 
 Result<std::unique_ptr<FileReader>> open_sqlite(const std::filesystem::path& file, const OpenOptions& options) {
-  auto database_result = Database::open(file);
+  auto database_result = Database::open(file, options.recover);
   if (!database_result) return database_result.error();
   auto reader = std::make_unique<SqliteReader>(std::move(*database_result), options);
   if (auto ok = reader->open(); !ok) return ok.error();

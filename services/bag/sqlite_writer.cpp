@@ -26,7 +26,8 @@ constexpr const char* kTables =
     "CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);"
     "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
     " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);"
-    "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
+    "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB "
+    "NOT NULL);"
     "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
     "CREATE TABLE jostle_notes(name TEXT NOT NULL, key TEXT NOT NULL, value TEXT NOT NULL);"
     "INSERT INTO schema(schema_version, ros_distro) VALUES (3, 'humble');"
@@ -77,15 +78,15 @@ class SqliteWriter final : public FileWriter {
     return open_bytes_ < kTransactionBytes ? Result<void>() : commit();
   }
 
-  Result<void> flush() override {
+  Result<void> flush(const Notes& notes) override {
     if (failure_) return *failure_;
+    for (const auto& [name, note] : notes) {
+      if (auto ok = kept(put_note(name, note)); !ok) return ok;
+    }
     return commit();
   }
 
-  Result<void> end_repeated() override {
-    if (auto ok = add_note(kRepeatedRow, {{"messages", std::to_string(messages_)}}); !ok) return kept(ok);
-    return flush();
-  }
+  Result<void> end_repeated() override { return flush({{kRepeatedRow, {{"messages", std::to_string(messages_)}}}}); }
 
   Result<void> close(const Notes& notes) override {
     if (is_closed_) return {};
@@ -130,11 +131,16 @@ class SqliteWriter final : public FileWriter {
     return result;
   }
 
-  Result<void> add_note(const std::string& name, const Note& note) {
+  Result<void> put_note(const std::string& name, const Note& note) {
     if (!database_.is_in_transaction()) {
       if (auto ok = database_.run("BEGIN"); !ok) return ok;
     }
-    auto statement_result = database_.prepare(fmt::format("INSERT INTO {}(name, key, value) VALUES (?, ?, ?)", kNotesTable));
+    auto remove_result = database_.prepare(fmt::format("DELETE FROM {} WHERE name = ?", kNotesTable));
+    if (!remove_result) return remove_result.error();
+    remove_result->bind(1, name);
+    if (auto ok = remove_result->run(); !ok) return ok;
+    auto statement_result =
+        database_.prepare(fmt::format("INSERT INTO {}(name, key, value) VALUES (?, ?, ?)", kNotesTable));
     if (!statement_result) return statement_result.error();
     for (const auto& [key, value] : note) {
       statement_result->bind(1, name);
@@ -148,7 +154,7 @@ class SqliteWriter final : public FileWriter {
   Result<void> complete(const Notes& notes) {
     Result<void> ok;
     for (const auto& [name, note] : notes) {
-      if (ok) ok = add_note(name, note);
+      if (ok) ok = put_note(name, note);
     }
     if (database_.is_in_transaction()) {
       if (ok) ok = database_.run("COMMIT");

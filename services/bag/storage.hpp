@@ -35,14 +35,15 @@ class FileWriter {
 
   virtual Result<void> add_topic(const Topic& topic) = 0;
   virtual Result<void> write(int topic, const MessageView& message) = 0;
-  virtual Result<void> flush() = 0;
+  /// `notes`: those that have changed since they were last written to this file.
+  virtual Result<void> flush(const Notes& notes) = 0;
 
   /// Everything written so far repeats what earlier files hold. Before anything else.
   virtual Result<void> end_repeated() = 0;
-  virtual Result<void> close(const Notes& notes) = 0;
+  virtual Result<void> close(const Notes& notes) = 0;  ///< as flush(), and what ends a file
 
-  virtual std::uint64_t bytes() const = 0;     ///< written or about to be
-  virtual WrittenFile written() const = 0;     ///< handed to the operating system
+  virtual std::uint64_t bytes() const = 0;  ///< written or about to be
+  virtual WrittenFile written() const = 0;  ///< handed to the operating system
 };
 
 struct FileInfo {

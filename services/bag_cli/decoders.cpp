@@ -12,7 +12,8 @@ Decoders::Decoders(const bag::BagInfo& info) {
     const std::string definition =
         topic.topic.definition.empty() ? bag::definition_of(topic.topic.type).value_or("") : topic.topic.definition;
     if (definition.empty()) {
-      reasons_.back() = fmt::format("{}: got no definition of {} in the bag, and none is known", topic.topic.name, topic.topic.type);
+      reasons_.back() =
+          fmt::format("{}: got no definition of {} in the bag, and none is known", topic.topic.name, topic.topic.type);
       continue;
     }
     auto decoder_result = bag::Decoder::create(topic.topic.type, definition);
@@ -28,7 +29,8 @@ Result<nlohmann::ordered_json> Decoders::decode(const bag::Message& message) con
   const auto topic = static_cast<std::size_t>(message.topic);
   auto json_result = decoders_.at(topic)->decode(message.data);
   if (json_result) return json_result;
-  return Error{json_result.error().code, fmt::format("{}: message of log time {}: {}", names_[topic], message.log_time, json_result.error().message)};
+  return Error{json_result.error().code, fmt::format("{}: message of log time {}: {}", names_[topic], message.log_time,
+                                                     json_result.error().message)};
 }
 
 }  // namespace jostle::services

@@ -34,7 +34,8 @@ class Output {
     if (output->file_ == nullptr) {
       const bool is_there = errno == EEXIST;
       return Error{is_there ? Code::kInvalidArgument : Code::kIo,
-                   is_there ? fmt::format("{}: got a file that is there, wanted a new name", path) : fmt::format("{}: cannot be made", path)};
+                   is_there ? fmt::format("{}: got a file that is there, wanted a new name", path)
+                            : fmt::format("{}: cannot be made", path)};
     }
     return output;
   }
@@ -49,7 +50,9 @@ class Output {
 
   Result<void> finish() {
     const bool was_written = std::ferror(file_) == 0 && std::fflush(file_) == 0;
-    if (!was_written) return Error{Code::kIo, fmt::format("{}: cannot be written", path_ == "-" ? "standard output" : path_)};
+    if (!was_written) {
+      return Error{Code::kIo, fmt::format("{}: cannot be written", path_ == "-" ? "standard output" : path_)};
+    }
     if (file_ != stdout) std::fclose(file_);
     file_ = nullptr;
     return {};
@@ -129,7 +132,8 @@ class Columns {
     std::vector<std::string> cells(names_.size());
     const auto on_cell = [&](const std::string& name, const Json& part) { cells[places_.at(name)] = cell(part); };
     flatten(value, "", on_cell);
-    std::string line = fmt::format("{:.9f},{},{}", 1e-9 * static_cast<double>(message.log_time - start), message.log_time, message.publish_time);
+    std::string line = fmt::format("{:.9f},{},{}", 1e-9 * static_cast<double>(message.log_time - start),
+                                   message.log_time, message.publish_time);
     for (const std::string& text : cells) line.append(",").append(text);
     return line + "\r\n";
   }
@@ -167,9 +171,10 @@ Result<Selection> select(const ExportArguments& arguments, const bag::BagInfo& i
   bool is_any = false;
   for (int topic = 0; topic < static_cast<int>(info.topics.size()); ++topic) {
     const std::string& name = info.topics[static_cast<std::size_t>(topic)].topic.name;
-    const bool is_wanted = arguments.topics.empty() || std::ranges::any_of(arguments.topics, [&](const std::string& pattern) {
-      return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
-    });
+    const bool is_wanted =
+        arguments.topics.empty() || std::ranges::any_of(arguments.topics, [&](const std::string& pattern) {
+          return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+        });
     if (!is_wanted) continue;
     is_any = true;
     if (decoders.has(topic)) {
@@ -179,10 +184,13 @@ Result<Selection> select(const ExportArguments& arguments, const bag::BagInfo& i
     }
   }
   if (!is_any && !arguments.topics.empty()) {
-    return Error{Code::kNotFound, fmt::format("--topic: got {}, wanted a pattern of a topic that `jostle bag info` shows",
-                                              fmt::join(arguments.topics, " "))};
+    return Error{Code::kNotFound,
+                 fmt::format("--topic: got {}, wanted a pattern of a topic that `jostle bag info` shows",
+                             fmt::join(arguments.topics, " "))};
   }
-  if (selection.topics.empty()) return Error{Code::kInvalidArgument, fmt::format("{}: no topic can be decoded", info.path.string())};
+  if (selection.topics.empty()) {
+    return Error{Code::kInvalidArgument, fmt::format("{}: no topic can be decoded", info.path.string())};
+  }
   return selection;
 }
 
@@ -206,14 +214,19 @@ Result<void> for_each(bag::BagReader& reader, const Decoders& decoders, const Se
   }
 }
 
-Result<void> export_json(bag::BagReader& reader, const Decoders& decoders, const Selection& selection, const std::string& path, std::stop_token stop) {
+Result<void> export_json(bag::BagReader& reader, const Decoders& decoders, const Selection& selection,
+                         const std::string& path, std::stop_token stop) {
   auto output_result = Output::open(path);
   if (!output_result) return output_result.error();
-  auto ok = for_each(reader, decoders, selection, "exporting", stop, [&](const bag::Message& message, const Json& json) {
-    const Json line{{"topic", reader.info().topics[static_cast<std::size_t>(message.topic)].topic.name}, {"log_time", message.log_time},
-                    {"publish_time", message.publish_time}, {"sequence", message.sequence}, {"message", json}};
-    (*output_result)->write(dump(line) + "\n");
-  });
+  auto ok =
+      for_each(reader, decoders, selection, "exporting", stop, [&](const bag::Message& message, const Json& json) {
+        const Json line{{"topic", reader.info().topics[static_cast<std::size_t>(message.topic)].topic.name},
+                        {"log_time", message.log_time},
+                        {"publish_time", message.publish_time},
+                        {"sequence", message.sequence},
+                        {"message", json}};
+        (*output_result)->write(dump(line) + "\n");
+      });
   return ok ? (*output_result)->finish() : ok;
 }
 
@@ -224,10 +237,12 @@ std::string file_name(const std::string& topic) {
   return (name.empty() ? "topic" : name) + ".csv";
 }
 
-Result<void> export_csv(bag::BagReader& reader, const Decoders& decoders, const Selection& selection, const std::string& folder, std::stop_token stop) {
+Result<void> export_csv(bag::BagReader& reader, const Decoders& decoders, const Selection& selection,
+                        const std::string& folder, std::stop_token stop) {
   if (folder == "-" && selection.topics.size() > 1) {
-    return Error{Code::kInvalidArgument, fmt::format("--csv to standard output: got {} topics, wanted one; remedy: --topic, or --output FOLDER",
-                                                     selection.topics.size())};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("--csv to standard output: got {} topics, wanted one; remedy: --topic, or --output FOLDER",
+                             selection.topics.size())};
   }
   std::map<int, Columns> columns;
   auto ok = for_each(reader, decoders, selection, "looking for columns", stop,
@@ -246,9 +261,10 @@ Result<void> export_csv(bag::BagReader& reader, const Decoders& decoders, const 
       (*output_result)->write(found.head());
       outputs[topic] = std::move(*output_result);
     }
-    auto written = for_each(reader, decoders, selection, "exporting", stop, [&](const bag::Message& message, const Json& json) {
-      outputs[message.topic]->write(columns[message.topic].row(message, reader.info().start, json));
-    });
+    auto written =
+        for_each(reader, decoders, selection, "exporting", stop, [&](const bag::Message& message, const Json& json) {
+          outputs[message.topic]->write(columns[message.topic].row(message, reader.info().start, json));
+        });
     for (auto& [topic, output] : outputs) {
       if (written) written = output->finish();
     }
@@ -268,7 +284,8 @@ int export_bag(const ExportArguments& arguments, std::stop_token stop) {
   const Decoders decoders((*reader_result)->info());
   const auto selection_result = select(arguments, (*reader_result)->info(), decoders);
   if (!selection_result) return fail(selection_result.error(), kExitFailed);
-  const auto ok = (arguments.as_csv ? export_csv : export_json)(**reader_result, decoders, *selection_result, arguments.output, stop);
+  const auto ok = (arguments.as_csv ? export_csv : export_json)(**reader_result, decoders, *selection_result,
+                                                                arguments.output, stop);
   if (ok) return kExitOk;
   return fail(ok.error(), ok.error().code == Code::kInvalidArgument ? kExitFailed : kExitBroken);
 }

@@ -20,7 +20,8 @@ double seconds(bag::Time time) { return 1e-9 * static_cast<double>(time); }
 
 std::string date_text(bag::Time time) {
   constexpr bag::Time kSecond = 1'000'000'000;
-  return fmt::format("{:%Y-%m-%d %H:%M:%S}.{:06} UTC", fmt::gmtime(static_cast<std::time_t>(time / kSecond)), time % kSecond / 1000);
+  return fmt::format("{:%Y-%m-%d %H:%M:%S}.{:06} UTC", fmt::gmtime(static_cast<std::time_t>(time / kSecond)),
+                     time % kSecond / 1000);
 }
 
 std::string size_text(std::uint64_t bytes) {
@@ -42,32 +43,49 @@ double rate_of(const bag::BagInfo& info, const bag::TopicInfo& topic) {
 }
 
 std::string qos_words(const dds::Qos& qos) {
-  return fmt::format("{}{}{}", qos.reliable ? "reliable" : "best effort", qos.latched ? ", latched" : "", qos.retained ? ", retained" : "");
+  return fmt::format("{}{}{}", qos.reliable ? "reliable" : "best effort", qos.latched ? ", latched" : "",
+                     qos.retained ? ", retained" : "");
 }
 
 nlohmann::ordered_json to_json(const bag::BagInfo& info) {
   nlohmann::ordered_json topics = nlohmann::ordered_json::array();
   for (const bag::TopicInfo& topic : info.topics) {
-    nlohmann::ordered_json object{{"name", topic.topic.name}, {"type", topic.topic.type}, {"messages", topic.messages},
-                                  {"rate", rate_of(info, topic)}, {"lost", nullptr},
-                                  {"qos", {{"reliable", topic.topic.qos.reliable}, {"latched", topic.topic.qos.latched},
-                                           {"retained", topic.topic.qos.retained}, {"depth", topic.topic.qos.depth}}},
+    nlohmann::ordered_json object{{"name", topic.topic.name},
+                                  {"type", topic.topic.type},
+                                  {"messages", topic.messages},
+                                  {"rate", rate_of(info, topic)},
+                                  {"lost", nullptr},
+                                  {"qos",
+                                   {{"reliable", topic.topic.qos.reliable},
+                                    {"latched", topic.topic.qos.latched},
+                                    {"retained", topic.topic.qos.retained},
+                                    {"depth", topic.topic.qos.depth}}},
                                   {"has_definition", !topic.topic.definition.empty()}};
-    if (const std::string lost = lost_of(info, topic.topic.name); !lost.empty()) object["lost"] = std::atoll(lost.c_str());
+    if (const std::string lost = lost_of(info, topic.topic.name); !lost.empty()) {
+      object["lost"] = std::atoll(lost.c_str());
+    }
     topics.push_back(std::move(object));
   }
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
   for (const auto& file : info.files) files.push_back(file.string());
-  return {{"path", info.path.string()}, {"storage", info.storage}, {"files", files}, {"bytes", info.bytes},
-          {"start_ns", info.start}, {"end_ns", info.end}, {"duration_s", seconds(info.end - info.start)},
-          {"messages", info.messages}, {"topics", topics}, {"notes", info.notes}};
+  return {{"path", info.path.string()},
+          {"storage", info.storage},
+          {"files", files},
+          {"bytes", info.bytes},
+          {"start_ns", info.start},
+          {"end_ns", info.end},
+          {"duration_s", seconds(info.end - info.start)},
+          {"messages", info.messages},
+          {"topics", topics},
+          {"notes", info.notes}};
 }
 
 void print(const bag::BagInfo& info) {
   fmt::print("bag       {}\nstorage   {}, {} in {} file{}\n", info.path.string(), info.storage, size_text(info.bytes),
              info.files.size(), info.files.size() == 1 ? "" : "s");
   if (info.messages > 0) {
-    fmt::print("start     {}\nend       {}\nduration  {:.3f} s\n", date_text(info.start), date_text(info.end), seconds(info.end - info.start));
+    fmt::print("start     {}\nend       {}\nduration  {:.3f} s\n", date_text(info.start), date_text(info.end),
+               seconds(info.end - info.start));
   }
   fmt::print("messages  {}\n", info.messages);
   std::size_t name_width = 5, type_width = 4;
@@ -75,11 +93,12 @@ void print(const bag::BagInfo& info) {
     name_width = std::max(name_width, topic.topic.name.size());
     type_width = std::max(type_width, topic.topic.type.size());
   }
-  fmt::print("\n{:{}}  {:{}}  {:>9}  {:>9}  {:>6}  {}\n", "topic", name_width, "type", type_width, "messages", "1/s", "lost", "offered");
+  fmt::print("\n{:{}}  {:{}}  {:>9}  {:>9}  {:>6}  {}\n", "topic", name_width, "type", type_width, "messages", "1/s",
+             "lost", "offered");
   for (const bag::TopicInfo& topic : info.topics) {
     const std::string lost = lost_of(info, topic.topic.name);
-    fmt::print("{:{}}  {:{}}  {:>9}  {:>9.1f}  {:>6}  {}\n", topic.topic.name, name_width, topic.topic.type, type_width, topic.messages,
-               rate_of(info, topic), lost.empty() ? "-" : lost, qos_words(topic.topic.qos));
+    fmt::print("{:{}}  {:{}}  {:>9}  {:>9.1f}  {:>6}  {}\n", topic.topic.name, name_width, topic.topic.type, type_width,
+               topic.messages, rate_of(info, topic), lost.empty() ? "-" : lost, qos_words(topic.topic.qos));
   }
   for (const auto& [name, note] : info.notes) {
     if (name == kRosbag2 || name == kLost) continue;

@@ -16,8 +16,8 @@ constexpr const char* kExample =
     "  jostle bag export experiment --csv -o tables      a table per topic\n"
     "  jostle bag export experiment --json --topic '/robot/*' --from 10 --to 12 | jq .message.q\n"
     "A bag is a folder, or one of its files (.mcap, .db3); those of rosbag2 are read, too. docs/bags.md says more.\n"
-    "Exit codes: 0 done, 1 damaged or nothing to show, 2 wrong arguments or no bag, 3 output cannot be written,\n"
-    "130 interrupted.";
+    "Exit codes: 0 done, 1 verified and damaged, or nothing to save or export, 2 wrong arguments or a bag that cannot\n"
+    "be opened, 3 output cannot be written, 130 interrupted.";
 
 }  // namespace
 
@@ -37,15 +37,26 @@ int main(int argc, char** argv) {
   InfoArguments info;
   CLI::App* info_command = command("info", "topics, types, counts, rates, duration, lost samples, notes");
   info_command->add_flag("--json", info.as_json, "as an object");
-  info_command->callback([&] { work = [&](std::stop_token) { info.bag = bag; return show_info(info); }; });
+  info_command->callback([&] {
+    work = [&](std::stop_token) {
+      info.bag = bag;
+      return show_info(info);
+    };
+  });
 
-  command("verify", "read everything: checksums, counts, order, definitions")
-      ->callback([&] { work = [&](std::stop_token stop) { return verify_bag(bag, stop); }; });
+  command("verify", "read everything: checksums, counts, order, definitions")->callback([&] {
+    work = [&](std::stop_token stop) { return verify_bag(bag, stop); };
+  });
 
   RecoverArguments recover;
   CLI::App* recover_command = command("recover", "save what is readable of a damaged or unfinished bag");
   recover_command->add_option("-o,--output", recover.output, "new folder (default: the bag's name and -recovered)");
-  recover_command->callback([&] { work = [&](std::stop_token stop) { recover.bag = bag; return recover_bag(recover, stop); }; });
+  recover_command->callback([&] {
+    work = [&](std::stop_token stop) {
+      recover.bag = bag;
+      return recover_bag(recover, stop);
+    };
+  });
 
   ExportArguments exported;
   CLI::App* export_command = command("export", "decoded messages, as tables or as JSON");
@@ -54,7 +65,8 @@ int main(int argc, char** argv) {
   form->add_flag("--csv", exported.as_csv, "a table per topic; arrays of more than 64 elements are one cell");
   form->add_flag("--json", as_json, "an object per line");
   form->require_option(1);
-  export_command->add_option("--topic", exported.topics, "only topics of this pattern, such as '/robot/*'; may be given again")
+  export_command
+      ->add_option("--topic", exported.topics, "only topics of this pattern, such as '/robot/*'; may be given again")
       ->allow_extra_args(false);
   export_command->add_option("--from", exported.from, "seconds since the bag's start");
   export_command->add_option("--to", exported.to, "seconds since the bag's start");

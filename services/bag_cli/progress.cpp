@@ -8,7 +8,10 @@
 namespace jostle::services {
 
 Progress::Progress(std::string what, std::uint64_t total)
-    : what_(std::move(what)), total_(total), is_terminal_(isatty(STDERR_FILENO) != 0), next_(std::chrono::steady_clock::now()) {}
+    : what_(std::move(what)),
+      total_(total),
+      is_terminal_(isatty(STDERR_FILENO) != 0),
+      next_(std::chrono::steady_clock::now()) {}
 
 Progress::~Progress() {
   if (is_shown_) fmt::print(stderr, "\r\033[K");
@@ -21,7 +24,8 @@ void Progress::show(std::uint64_t done) {
   if (now < next_) return;
   next_ = now + std::chrono::milliseconds(250);
   is_shown_ = true;
-  fmt::print(stderr, "\r{}: {} of {} messages ({} %)\033[K", what_, done, total_, total_ == 0 ? 100 : done * 100 / total_);
+  fmt::print(stderr, "\r{}: {} of {} messages ({} %)\033[K", what_, done, total_,
+             total_ == 0 ? 100 : done * 100 / total_);
 }
 
 int fail(const Error& error, int otherwise) {

@@ -35,7 +35,9 @@ Result<std::uint64_t> copy(bag::CheckedReader& from, bag::BagWriter& to, std::st
     auto message_result = from.next();
     if (!message_result) return message_result.error();
     if (!*message_result) return done;
-    if (auto ok = to.write(topics[static_cast<std::size_t>((*message_result)->topic)], (*message_result)->view()); !ok) return ok.error();
+    if (auto ok = to.write(topics[static_cast<std::size_t>((*message_result)->topic)], (*message_result)->view()); !ok) {
+      return ok.error();
+    }
     ++done;
   }
 }
@@ -48,8 +50,11 @@ int recover_bag(const RecoverArguments& arguments, std::stop_token stop) {
   bag::CheckedReader& reader = **reader_result;
   const fs::path output = arguments.output.empty() ? default_output(arguments.bag) : arguments.output;
   using Storage = bag::BagOptions::Storage;
-  auto writer_result = bag::BagWriter::create(output, {.storage = reader.info().storage == "mcap" ? Storage::kMcap : Storage::kSqlite});
-  if (!writer_result) return fail(writer_result.error(), writer_result.error().code == Code::kInvalidArgument ? kExitUsage : kExitBroken);
+  auto writer_result =
+      bag::BagWriter::create(output, {.storage = reader.info().storage == "mcap" ? Storage::kMcap : Storage::kSqlite});
+  if (!writer_result) {
+    return fail(writer_result.error(), writer_result.error().code == Code::kInvalidArgument ? kExitUsage : kExitBroken);
+  }
   for (const auto& [name, note] : reader.info().notes) (*writer_result)->set_note(name, note);
 
   const auto count_result = copy(reader, **writer_result, stop);

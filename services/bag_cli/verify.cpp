@@ -26,7 +26,8 @@ Result<std::uint64_t> read_all(bag::BagReader& reader, const Decoders& decoders,
     if (!*message_result) break;
     const bag::Message& message = **message_result;
     if (message.log_time < before) {
-      return Error{Code::kInvalidArgument, fmt::format("{}: got log time {} after {}, wanted them in order", info.path.string(), message.log_time, before)};
+      return Error{Code::kInvalidArgument, fmt::format("{}: got log time {} after {}, wanted them in order",
+                                                       info.path.string(), message.log_time, before)};
     }
     before = message.log_time;
     ++counts[static_cast<std::size_t>(message.topic)];
@@ -36,8 +37,9 @@ Result<std::uint64_t> read_all(bag::BagReader& reader, const Decoders& decoders,
   }
   for (std::size_t i = 0; i < counts.size(); ++i) {
     if (counts[i] == info.topics[i].messages) continue;
-    return Error{Code::kInvalidArgument, fmt::format("{}: topic {}: got {} messages, wanted {} as the bag says", info.path.string(),
-                                                     info.topics[i].topic.name, counts[i], info.topics[i].messages)};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: topic {}: got {} messages, wanted {} as the bag says", info.path.string(),
+                             info.topics[i].topic.name, counts[i], info.topics[i].messages)};
   }
   return done;
 }
@@ -49,14 +51,16 @@ int verify_bag(const std::filesystem::path& bag, std::stop_token stop) {
   if (!reader_result) return fail(reader_result.error(), kExitFailed);
   bag::CheckedReader& reader = **reader_result;
   const Decoders decoders(reader.info());
-  if (auto ok = reader.verify([&](const auto&) { return !stop.stop_requested(); }); !ok) return fail(ok.error(), kExitFailed);
+  if (auto ok = reader.verify([&](const auto&) { return !stop.stop_requested(); }); !ok) {
+    return fail(ok.error(), kExitFailed);
+  }
   const auto count_result = read_all(reader, decoders, stop);
   if (!count_result) return fail(count_result.error(), kExitFailed);
   for (int topic = 0; topic < static_cast<int>(reader.info().topics.size()); ++topic) {
     if (!decoders.has(topic)) fmt::print("not decoded: {}\n", decoders.reason(topic));
   }
-  fmt::print("ok: {} messages of {} topics in {} file{}\n", *count_result, reader.info().topics.size(), reader.info().files.size(),
-             reader.info().files.size() == 1 ? "" : "s");
+  fmt::print("ok: {} messages of {} topics in {} file{}\n", *count_result, reader.info().topics.size(),
+             reader.info().files.size(), reader.info().files.size() == 1 ? "" : "s");
   return kExitOk;
 }
 

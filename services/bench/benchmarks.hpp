@@ -69,6 +69,10 @@ Result<Measurements> measure_parareal_scheduling(const Settings& settings);
 /// Messages of 1 KiB into a bag of each kind against bare appends of the same bytes, messages/s.
 Result<Measurements> measure_bag(const Settings& settings);
 
+/// A bag of 1000 messages per second, played at rates from 0.1 to 10 by another process: the
+/// time it takes as heard here against the time it has in the bag, ms.
+Result<Measurements> measure_play(const Settings& settings);
+
 /// The other process of `round-trip`: answers every task until it is told to
 /// end. Returns the exit code.
 int serve_echo(int domain, std::stop_token stop);

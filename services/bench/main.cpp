@@ -6,8 +6,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include "services/bench/benchmarks.hpp"
+#include "services/bench/chaos.hpp"
 #include "services/bench/cheap_physics.hpp"
 #include "services/bench/pool_timeline.hpp"
 #include "services/bench/record.hpp"
@@ -27,6 +29,7 @@ struct Benchmark {
 
 constexpr auto kBenchmarks = std::to_array<Benchmark>({
     {"bag", "messages into a bag against bare appends of the same bytes", 7, measure_bag},
+    {"play", "a bag as a subscriber hears it against the bag, at rates from 0.1 to 10", 3, measure_play},
     {"pool-threads", "ThreadPool against bare loops of engine steps", 15, measure_pool_threads},
     {"pool-dds", "two worker processes against two bare loops", 15, measure_pool_dds},
     {"round-trip", "an empty task through the pool against a bare Fast DDS echo", 25, measure_round_trip},
@@ -40,11 +43,13 @@ constexpr auto kBenchmarks = std::to_array<Benchmark>({
     {"unplugged", "a plan whose workers' host is unplugged for a while against one left alone", 5, measure_unplugged},
 });
 
+constexpr const char* kChaos = "chaos";
 constexpr const char* kCheapPhysics = "cheap-physics";
 constexpr const char* kPool = "pool";
 constexpr const char* kRecord = "record";
 
 int list() {
+  fmt::print("{:<20} {}\n", kChaos, "plans while workers are killed, stalled and unplugged: all bit-equal, and how slow");
   fmt::print("{:<20} {}\n", kCheapPhysics, "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers");
   fmt::print("{:<20} {}\n", kPool, "what each worker did when: busy shares, gaps, a picture");
   fmt::print("{:<20} {}\n", kRecord, "the recorder at 20,000 messages per second, or what it costs a plan");
@@ -80,10 +85,24 @@ int compare_levers(const Settings& settings, const std::string& json, const std:
   return ok ? kExitOk : fail(ok.error(), kExitBroken);
 }
 
+std::optional<Error> not_one_number(const std::vector<int>& workers) {
+  if (workers.size() < 2) return {};
+  return Error{Code::kInvalidArgument, fmt::format("--workers: got {} numbers, wanted one", workers.size())};
+}
+
+int disturb(const Settings& settings, ChaosOptions options) {
+  if (const auto problem = not_one_number(settings.workers)) return fail(*problem, kExitUsage);
+  if (!settings.workers.empty()) options.workers = settings.workers.front();
+  options.domain = settings.domain;
+  options.on_news = settings.on_news;
+  options.stop = settings.stop;
+  const auto equal_result = bench_chaos(options);
+  if (!equal_result) return fail(equal_result.error(), kExitBroken);
+  return *equal_result ? kExitOk : kExitFailed;
+}
+
 int show_pool(const Settings& settings, PoolTimelineOptions options) {
-  if (settings.workers.size() > 1) {
-    return fail({Code::kInvalidArgument, fmt::format("--workers: got {} numbers, wanted one", settings.workers.size())}, kExitUsage);
-  }
+  if (const auto problem = not_one_number(settings.workers)) return fail(*problem, kExitUsage);
   options.workers = settings.workers.empty() ? usable_cores() : settings.workers.front();
   if (settings.repeats > 0) options.batches = settings.repeats;
   options.domain = settings.domain;
@@ -130,8 +149,12 @@ int main(int argc, char** argv) {
       ->capture_default_str()->delimiter(',')->check(CLI::IsMember(parts));
   app.add_option("--worlds", worlds, "Of cheap-physics: worlds of 15 objects that are planned and executed")
       ->capture_default_str()->check(CLI::Range(1, 1000));
-  app.add_option("--workers", settings.workers, "Of scheduling: worker processes, such as 8,16,64 (default: 64);\nof pool: their number (default: one per core this process may use)")
+  app.add_option("--workers", settings.workers, "Of scheduling, hosts-scheduling: worker processes, such as 8,16,64 (default: 64);\n"
+                 "of pool: their number (default: one per core this process may use); of chaos: theirs (default: 4)")
       ->delimiter(',')->check(CLI::Range(1, 1024));
+  ChaosOptions chaos;
+  app.add_option("--seed", chaos.seed, "Of chaos: of its schedule")->capture_default_str();
+  app.add_option("--faults", chaos.faults, "Of chaos: how many")->capture_default_str()->check(CLI::Range(1, 1'000'000));
   PoolTimelineOptions timeline;
   bool pin = false;
   app.add_option("--timeline", timeline.picture, "Of pool: PNG or SVG of what each worker did when");
@@ -153,6 +176,14 @@ int main(int argc, char** argv) {
   const StopSignal signal;
   settings.stop = signal.token();
   try {
+    if (name == kChaos) {
+      chaos.json = json;
+      return disturb(settings, chaos);
+    }
+    if (app.count("--seed") + app.count("--faults") > 0) {
+      fmt::print(stderr, "jostle bench: --seed, --faults: got '{}', wanted {}\n", name, kChaos);
+      return kExitUsage;
+    }
     if (name == kCheapPhysics) return compare_levers(settings, json, plot, worlds, parts);
     if (name == kPool) {
       timeline.json = json;

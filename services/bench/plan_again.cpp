@@ -9,7 +9,7 @@ Result<PlanAgain> PlanAgain::make(physics_pool::Pool& pool, int iterations) {
   if (!scene_result) return scene_result.error();
   auto world_result = pool.load(*scene_result);
   if (!world_result) return world_result.error();
-  const physics_pool::RolloutBatch straight = push(*scene_result, 6, 1.0, 1);
+  const physics_pool::RolloutBatch straight = push(*scene_result, 3, 1.0, 1);
   return PlanAgain(pool, {.world = *world_result,
                           .x0 = straight.x0,
                           .initial = straight.nominal,

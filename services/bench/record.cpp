@@ -167,6 +167,8 @@ Result<json> read_json(const fs::path& file) {
 }
 
 Result<ChildProcess> start_recorder(const fs::path& folder, int domain) {
+  std::error_code ignored;
+  fs::remove(folder.string() + ".log", ignored);  // of an earlier one, which was ready, too
   auto process_result = ChildProcess::start(
       program_folder() / "jostle_record",
       {"--output", folder.string(), "--json", folder.string() + ".json", "--domain", std::to_string(domain), "--die-with-parent",

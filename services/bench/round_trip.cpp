@@ -169,12 +169,12 @@ class Link {
     for (const std::size_t bytes : kPayloads) {
       const msg::Task task = task_of_size(*scene_result, bytes, true);
       const auto ask = [&](Domain& domain) { return there_and_back(domain, task, trips(bytes)); };
-      if (auto ok = add("round-trip/" + size_name(bytes), "us", *protected_result, *plain_result, ask); !ok) return ok.error();
+      if (auto ok = add(fmt::format("round-trip/{}", size_name(bytes)), "us", *protected_result, *plain_result, ask); !ok) return ok.error();
     }
     for (const std::size_t bytes : kPayloads) {
       const msg::Task task = task_of_size(*scene_result, bytes, false);
       const auto send = [&](Domain& domain) { return flood(domain, task, messages(bytes)); };
-      if (auto ok = add("throughput/" + size_name(bytes), "MB/s", *protected_result, *plain_result, send); !ok) return ok.error();
+      if (auto ok = add(fmt::format("throughput/{}", size_name(bytes)), "MB/s", *protected_result, *plain_result, send); !ok) return ok.error();
     }
     return std::move(measurements_);
   }

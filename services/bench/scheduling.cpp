@@ -84,7 +84,7 @@ Result<Measurement> measure_across(int workers, const Settings& settings, const 
   auto result = measure_with(workers, settings, &hosts);
   if (!way) unsetenv("JOSTLE_DISCOVERY");
   if (!result) return result.error();
-  result->name = "hosts-" + result->name;
+  result->name = fmt::format("hosts-{}", result->name);
   result->details.emplace_back("hosts", hosts.count() - 1);
   return result;
 }

@@ -228,6 +228,7 @@ std::string Participant::wire_name(const std::string& topic, Scope scope) const 
 }
 
 std::vector<std::string> profiles_for(const Participant::Core& core, const std::string& topic, const Qos& qos) {
+  if (qos.kind.empty()) return {};
   std::vector<std::string> names{topic};
   const std::string inside = in_namespace(core.space, "rt/");
   if (topic.starts_with(inside)) names.push_back("rt/" + topic.substr(inside.size()));

@@ -19,7 +19,7 @@ Publisher::Publisher(const dds::Participant& participant, const std::vector<Play
     outputs_.push_back({.name = topic.name,
                         .writer = dds::RawWriter(participant, topic.wire),
                         .keeps = topic.wire.qos.latched || topic.wire.qos.retained,
-                        .is_state = topic.is_state});
+                        .is_retold = topic.is_state && !topic.wire.qos.latched});
   }
 }
 
@@ -47,7 +47,7 @@ void Publisher::on_moment(const std::vector<bag::Message>& state) {
 
 void Publisher::write(Output& to, const bag::Message& message) {
   if (!to.writer.write(message.data)) ++refused_;
-  if (to.is_state) {
+  if (to.is_retold) {
     to.newest = message.data;
     to.readers = to.writer.matched();
   }
@@ -56,7 +56,7 @@ void Publisher::write(Output& to, const bag::Message& message) {
 
 void Publisher::tell_newcomers() {
   for (Output& to : outputs_) {
-    if (!to.is_state || to.newest.empty()) continue;
+    if (to.newest.empty()) continue;
     const int readers = to.writer.matched();
     if (readers > to.readers) to.writer.write(to.newest);
     to.readers = readers;

@@ -30,6 +30,7 @@ class Publisher final : public Playback::Sink {
 
   /// For while playback stands: the newest message of a state topic again if it has readers that
   /// were not there before. Most readers of states ask for no kept samples, and no next one comes.
+  /// Latched topics need none of this.
   void tell_newcomers();
 
   /// Topics with fewer readers than that.
@@ -47,10 +48,11 @@ class Publisher final : public Playback::Sink {
   struct Output {
     std::string name;
     dds::RawWriter writer;
-    bool keeps = false, is_state = false;
+    bool keeps = false;      // samples for late readers
+    bool is_retold = false;  // see tell_newcomers()
     std::uint64_t sent = 0;
-    std::vector<std::byte> newest;  // of a state topic
-    int readers = 0;                // when last looked at
+    std::vector<std::byte> newest;  // of a topic that is retold
+    int readers = 0;                // of it, when last looked at
   };
 
   Output& output(int topic) { return outputs_[by_topic_.at(static_cast<std::size_t>(topic))]; }

@@ -77,7 +77,7 @@ Result<std::pair<std::string, std::string>> parse_remap(const std::string& text)
 
 bool commands_somebody(const bag::Topic& topic) {
   for (const std::string& own : {topics::kRobotCommand.name, topics::kTaskGoal.name, topics::kTaskCancel.name}) {
-    if (topic.name == dds::ros_topic(own)) return true;
+    if (topic.name.ends_with(dds::ros_topic(own).value_or("/?"))) return true;  // in a namespace or not
   }
   return topic.name.starts_with("/pool/") || topic.name.find("/_action/") != std::string::npos ||
          std::ranges::count(kCommandWords, last_word(topic.name)) > 0 ||

@@ -26,9 +26,9 @@ struct PlayedTopic {
   int topic = 0;       ///< index of BagInfo::topics
   std::string name;    ///< as ROS 2 shows it when played
   dds::RawTopic wire;  ///< with what its writer offered
-  /// Its last message belongs to a moment: that of a latched topic, and of a state, which are
-  /// /joint_states, /tf, /objects/poses, /objects/states, /robot/status, /task/feedback and
-  /// /pool/worker, in a namespace or not.
+  /// Its last message belongs to a moment: that of a latched topic, and of a state. States are
+  /// the system's own topics of kind kState (topics.hpp): /joint_states, /tf, /robot/status and
+  /// so on, in a namespace or not.
   bool is_state = false;
 };
 

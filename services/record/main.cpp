@@ -154,7 +154,7 @@ int main(int argc, char** argv) {
   ProcessOptions process;
   app.add_option("topics", arguments.topics, "Globs of topics, such as '/robot/*'; * goes past slashes (default: all)");
   app.add_option("-o,--output", arguments.folder, "Folder of the bag (default: record_ and date and time)");
-  app.add_option("--exclude", arguments.excluded, "Globs of topics to leave out (default: /pool/* unless topics are given)");
+  app.add_option("--exclude", arguments.excluded, "Globs of topics to leave out (default: /pool/*, unless topics are given)");
   app.add_option("--storage", arguments.storage, "mcap, or sqlite3 for tools that read nothing else")
       ->capture_default_str()->check(CLI::IsMember({"mcap", "sqlite3"}));
   app.add_flag("--no-compress", arguments.no_compress, "Plain MCAP: three times the size, less processor time");

@@ -24,7 +24,6 @@ constexpr std::uint64_t kLookAtDisk = 16 << 20;      // bytes written before the
 // the writer, even if the writer has found it.
 const dds::RawTopic kTrigger{"rt/record/trigger", "std_msgs::msg::dds_::Empty_", {.depth = dds::kKeepAll}};
 
-constexpr const char* kResultType = "jostle_msgs/msg/GoalResult";  // in whatever namespace
 
 bag::Time wall_clock() {
   const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
@@ -91,14 +90,6 @@ Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher
   std::unique_ptr<Recorder> recorder(new Recorder(std::move(options), std::move(watcher)));
   if (auto ok = recorder->check_disk(); !ok) return Error{Code::kInvalidArgument, ok.error().message};
   const RecordOptions& own = recorder->options_;
-  const std::filesystem::path folder = recorder->next_folder();
-  std::unique_ptr<bag::BagWriter> writer;
-  if (own.ring.count() == 0) {
-    auto writer_result = bag::BagWriter::create(folder, own.bag);
-    if (!writer_result) return writer_result.error();
-    writer = std::move(writer_result).value();
-    recorder->bags_.push_back(folder);
-  }
   auto subscriptions_result = Subscriptions::open(
       {.domain = own.domain,
        .selection = own.selection,
@@ -109,24 +100,33 @@ Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher
   if (!subscriptions_result) return subscriptions_result.error();
   recorder->subscriptions_ = std::move(subscriptions_result).value();
   if (own.until_result && !recorder->hears_results()) {
-    return Error{Code::kInvalidArgument, fmt::format("--until-result: got a selection without {}, wanted one with it",
-                                                     *dds::ros_topic(topics::kTaskResult.name))};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("--until-result: got a selection without {}, wanted one with it", recorder->result_topic())};
   }
-  if (writer) {
-    writer->set_note("record", own.note);
-    writer->set_note("lost", recorder->lost_note());
-  }
-  if (writer) recorder->bag_ = std::make_unique<OpenBag>(std::move(writer), *recorder->subscriptions_);
+  // Samples wait in the queue meanwhile; and what failed so far has left no folder.
+  auto ready = own.ring.count() > 0 ? recorder->await_triggers() : recorder->open_bag();
+  if (!ready) return ready.error();
+  return recorder;
+}
+
+Result<void> Recorder::open_bag() {
+  auto writer_result = bag::BagWriter::create(options_.folder, options_.bag);
+  if (!writer_result) return writer_result.error();
+  bag_ = std::make_unique<OpenBag>(std::move(writer_result).value(), *subscriptions_);
+  bag_->writer().set_note("record", options_.note);
+  bag_->writer().set_note("lost", lost_note());
+  bags_.push_back(options_.folder);
+  return {};
+}
+
+Result<void> Recorder::await_triggers() {
   try {
-    if (own.ring.count() > 0) {
-      recorder->trigger_reader_ = std::make_unique<dds::RawReader>(
-          recorder->subscriptions_->participant(), kTrigger,
-          [self = recorder.get()](std::span<const std::byte>, const dds::Origin&) { self->trigger(); });
-    }
+    trigger_reader_ = std::make_unique<dds::RawReader>(subscriptions_->participant(), kTrigger,
+                                                       [this](std::span<const std::byte>, const dds::Origin&) { trigger(); });
+    return {};
   } catch (const dds::SetupError& error) {
     return Error{Code::kUnavailable, error.what()};
   }
-  return recorder;
 }
 
 Recorder::Recorder(RecordOptions options, Watcher watcher)
@@ -141,9 +141,14 @@ Recorder::~Recorder() {
   if (subscriptions_) subscriptions_->close();  // its threads call on_sample()
 }
 
+// In our namespace: another robot's task is not the one that is waited for.
+std::string Recorder::result_topic() const {
+  return *dds::ros_topic(subscriptions_->participant().wire_name(topics::kTaskResult.name, topics::kTaskResult.scope));
+}
+
 bool Recorder::hears_results() const {
   for (int topic = 0; topic < topics(); ++topic) {
-    if (subscriptions_->topic(topic).type == kResultType) return true;
+    if (subscriptions_->topic(topic).name == result_topic()) return true;
   }
   return false;
 }
@@ -153,11 +158,14 @@ void Recorder::on_sample(int topic, std::span<const std::byte> data, const dds::
   queue_.push(topic, data, origin.source_time);
 }
 
-std::filesystem::path Recorder::next_folder() const {
-  if (options_.ring.count() == 0) return options_.folder;
-  std::filesystem::path folder = options_.folder;
-  folder += fmt::format("-{}", snapshots_ + 1);
-  return folder;
+// The next free one: whoever starts a ring again keeps what was written before.
+std::filesystem::path Recorder::next_snapshot() const {
+  std::error_code ignored;
+  for (int number = 1;; ++number) {
+    std::filesystem::path folder = options_.folder;
+    folder += fmt::format("-{}", number);
+    if (!std::filesystem::exists(folder, ignored)) return folder;
+  }
 }
 
 RecordReport Recorder::run(std::stop_token stop) {
@@ -166,8 +174,8 @@ RecordReport Recorder::run(std::stop_token stop) {
   if (options_.duration.count() > 0) end = started_ + options_.duration;
   std::string reason = "stopped";
   for (;;) {
-    if (auto ok = take_in(queue_.take(Clock::now() + kTick, stop)); !ok) return finish("failed", ok.error());
-    if (auto ok = write_snapshots(); !ok) return finish("failed", ok.error());
+    if (auto ok = take_in_all(queue_.take(Clock::now() + kTick, stop)); !ok) return finish("failed", ok.error());
+    write_snapshots();
     const auto now = Clock::now();
     if (result_seen_ && (!end || *end > now + kAfterResult)) {
       end = now + kAfterResult;
@@ -181,7 +189,7 @@ RecordReport Recorder::run(std::stop_token stop) {
         if (auto ok = bag_->writer().flush(); !ok) return finish("failed", ok.error());
         for (Tally& tally : tallies_) tally.safe = tally.written;
       }
-      look_at_disk();
+      if (bag_) look_at_disk();
       if (watcher_.on_progress) watcher_.on_progress(status());
     }
     if (disk_problem_) return finish("the disk is nearly full", {});
@@ -197,28 +205,40 @@ Recorder::Tally& Recorder::tally_of(int topic) {
   if (!std::exchange(tally.known, true)) {
     const bag::Topic known = subscriptions_->topic(topic);
     tally.latched = known.qos.latched;
-    tally.is_result = known.type == kResultType;
+    tally.is_result = known.name == result_topic();
   }
   return tally;
 }
 
-Result<void> Recorder::take_in(std::vector<QueuedSample> samples) {
-  Result<void> result;
-  for (QueuedSample& sample : samples) {
-    Tally& tally = tally_of(sample.topic);
-    const std::uint64_t memory = sample.memory();
-    // Results of earlier tasks are kept by who wrote them.
-    if (options_.until_result && tally.is_result && sample.publish_time >= started_at_) result_seen_ = true;
-    if (result && bag_) result = bag_->write(sample, sample.log_time);
-    if (!result) {
+Result<void> Recorder::take_in(QueuedSample sample) {
+  Tally& tally = tally_of(sample.topic);
+  const std::uint64_t memory = sample.memory();
+  // Results of earlier tasks are kept by who wrote them.
+  if (options_.until_result && tally.is_result && sample.publish_time >= started_at_) result_seen_ = true;
+  if (bag_) {
+    if (auto ok = bag_->write(sample, sample.log_time); !ok) {
       ++tally.unwritten;
-      continue;
+      return ok;
     }
-    if (!bag_) keep(std::move(sample));
-    ++tally.written;
-    ++messages_;
     unchecked_ += memory;
     if (unchecked_ >= kLookAtDisk) look_at_disk();
+  } else {
+    keep(std::move(sample));
+  }
+  ++tally.written;
+  ++messages_;
+  return {};
+}
+
+// After the first failure the rest is counted as lost.
+Result<void> Recorder::take_in_all(std::vector<QueuedSample> samples) {
+  Result<void> result;
+  for (QueuedSample& sample : samples) {
+    if (result) {
+      result = take_in(std::move(sample));
+    } else {
+      ++tally_of(sample.topic).unwritten;
+    }
   }
   return result;
 }
@@ -235,10 +255,9 @@ void Recorder::forget_old(bag::Time now) {
     const bool old = now - ring_.front().log_time > options_.ring.count();
     const bool much = ring_bytes_ > room;
     if (!old && !much) return;
-    if (!old && !std::exchange(ring_short_, true) && watcher_.on_warning) {
-      watcher_.on_warning(fmt::format("the ring holds {:.1f} s, wanted {:.1f}: more does not fit into --max-memory",
-                                      1e-9 * static_cast<double>(now - ring_.front().log_time),
-                                      1e-9 * static_cast<double>(options_.ring.count())));
+    if (!old && !std::exchange(ring_short_, true)) {
+      warn(fmt::format("the ring holds {:.1f} s, wanted {:.1f}: more does not fit into --max-memory",
+                       1e-9 * static_cast<double>(now - ring_.front().log_time), 1e-9 * static_cast<double>(options_.ring.count())));
     }
     QueuedSample sample = std::move(ring_.front());
     ring_.pop_front();
@@ -247,21 +266,25 @@ void Recorder::forget_old(bag::Time now) {
   }
 }
 
-Result<void> Recorder::write_snapshots() {
-  if (options_.ring.count() == 0 && triggers_.exchange(0) > 0 && watcher_.on_warning) {
-    watcher_.on_warning("a trigger without --ring does nothing: everything is recorded anyway");
-  }
-  if (options_.ring.count() == 0 || triggers_.load() == 0) return {};
-  triggers_ = 0;  // those that came together want the same
+void Recorder::write_snapshots() {
+  if (triggers_.exchange(0) == 0) return;  // those that came together want the same
+  if (bag_) return warn("a trigger without --ring does nothing: everything is recorded anyway");
+  // What came before the trigger may still wait.
+  if (auto ok = take_in_all(queue_.take(Clock::now(), {})); !ok) return warn(ok.error().message);
   forget_old(wall_clock());
-  if (ring_.empty() && in_force_.empty()) {
-    if (watcher_.on_warning) watcher_.on_warning("the ring is empty: nothing was written");
-    return {};
+  if (ring_.empty() && in_force_.empty()) return warn("the ring is empty: nothing was written");
+  auto written = check_disk();
+  if (written) written = write_snapshot();
+  if (!written) {
+    warn(written.error().message);
+    snapshot_problem_ = written.error();
   }
-  const std::filesystem::path folder = next_folder();
+}
+
+Result<void> Recorder::write_snapshot() {
+  const std::filesystem::path folder = next_snapshot();
   auto writer_result = bag::BagWriter::create(folder, options_.bag);
   if (!writer_result) return writer_result.error();
-  ++snapshots_;
   bags_.push_back(folder);
   OpenBag snapshot(std::move(writer_result).value(), *subscriptions_);
   const bag::Time begin = ring_.empty() ? wall_clock() : ring_.front().log_time;
@@ -280,6 +303,10 @@ Result<void> Recorder::write_snapshots() {
   if (result) result = closed;
   if (result && watcher_.on_snapshot) watcher_.on_snapshot(folder);
   return result;
+}
+
+void Recorder::warn(const std::string& text) const {
+  if (watcher_.on_warning) watcher_.on_warning(text);
 }
 
 Result<void> Recorder::check_disk() const {
@@ -331,22 +358,23 @@ void Recorder::look_at_disk() {
 RecordReport Recorder::finish(std::string reason, std::optional<Error> failure) {
   trigger_reader_.reset();
   for (const auto& [topic, refusals] : subscriptions_->unmatched()) {
-    if (watcher_.on_warning) {
-      watcher_.on_warning(fmt::format("{}: it has a writer and none of its messages came; got {} refusals by the middleware, wanted "
-                                      "an offer that a plain reader takes (shared ownership, no partition)", topic, refusals));
-    }
+    warn(fmt::format("{}: it has a writer and none of its messages came; got {} refusals by the middleware, wanted an offer "
+                     "that a plain reader takes (shared ownership, no partition)", topic, refusals));
   }
   subscriptions_->close();
+  for (const std::string& glob : options_.selection.topics) {
+    bool found = false;
+    for (int topic = 0; topic < topics() && !found; ++topic) found = Selection{.topics = {glob}}.wants(subscriptions_->topic(topic).name);
+    if (!found) warn(fmt::format("{}: no topic of that name that can be recorded was found", glob));
+  }
   // What came before the end belongs to it; after a failed write it is counted as lost.
   auto rest = queue_.take(Clock::now(), {});
   if (failure) {
     for (const QueuedSample& sample : rest) ++tally_of(sample.topic).unwritten;
-  } else if (auto ok = take_in(std::move(rest)); !ok) {
+  } else if (auto ok = take_in_all(std::move(rest)); !ok) {
     failure = ok.error();
   }
-  if (!failure) {
-    if (auto ok = write_snapshots(); !ok) failure = ok.error();
-  }
+  write_snapshots();
   RecordReport report{.reason = std::move(reason)};
   if (bag_) {
     if (failure) count_unsafe();
@@ -361,7 +389,7 @@ RecordReport Recorder::finish(std::string reason, std::optional<Error> failure) 
     report.topics[subscriptions_->topic(topic).name] = {.messages = place < tallies_.size() ? tallies_[place].written : 0,
                                                         .lost = lost(topic)};
   }
-  report.problem = failure ? failure : disk_problem_;
+  report.problem = failure ? failure : disk_problem_ ? disk_problem_ : snapshot_problem_;
   return report;
 }
 

@@ -23,12 +23,12 @@
 namespace jostle::services {
 
 struct RecordOptions {
-  std::filesystem::path folder;  ///< of the bag; with a ring, bags are FOLDER-1, FOLDER-2, …
+  std::filesystem::path folder;  ///< of the bag; with a ring, bags are FOLDER-1, FOLDER-2, … as far as they are free
   Selection selection;
   bag::BagOptions bag;
   std::chrono::nanoseconds ring{0};       ///< keep so much, and write it when asked to; 0: write everything
   std::uint64_t max_memory = 256 << 20;   ///< bytes of samples in memory, > 0
-  std::uint64_t min_free = 512 << 20;     ///< bytes on the disk; below, the recording ends
+  std::uint64_t min_free = 512 << 20;     ///< bytes on the disk; below, the recording ends, or the ring is not written
   std::chrono::nanoseconds duration{0};   ///< the recording ends after it; 0: never by itself
   bool until_result = false;              ///< it ends shortly after a task's result
   std::optional<int> domain;
@@ -77,7 +77,8 @@ class Recorder {
   };
 
   /// Subscribed when this returns.
-  /// Errors   kInvalidArgument  the folder exists, no topic can be selected, less free disk than min_free
+  /// Errors   kInvalidArgument  the folder exists, less free disk than min_free, a selection without
+  ///                            results for until_result, a domain that is none
   ///          kIo, kUnavailable
   static Result<std::unique_ptr<Recorder>> start(RecordOptions options, Watcher watcher);
   ~Recorder();
@@ -106,12 +107,18 @@ class Recorder {
   Recorder(RecordOptions options, Watcher watcher);
 
   void on_sample(int topic, std::span<const std::byte> data, const dds::Origin& origin);
+  std::string result_topic() const;
   bool hears_results() const;
-  std::filesystem::path next_folder() const;
-  Result<void> take_in(std::vector<QueuedSample> samples);
+  Result<void> open_bag();
+  Result<void> await_triggers();
+  std::filesystem::path next_snapshot() const;
+  Result<void> take_in(QueuedSample sample);
+  Result<void> take_in_all(std::vector<QueuedSample> samples);
   Tally& tally_of(int topic);
   void keep(QueuedSample sample);
-  Result<void> write_snapshots();
+  void write_snapshots();
+  Result<void> write_snapshot();
+  void warn(const std::string& text) const;
   Result<void> check_disk() const;
   void look_at_disk();
   void forget_old(bag::Time now);
@@ -128,17 +135,17 @@ class Recorder {
   SampleQueue queue_;
   std::atomic<int> triggers_ = 0;
   bool result_seen_ = false;
-  int snapshots_ = 0;
 
   std::deque<QueuedSample> ring_;
   std::uint64_t ring_bytes_ = 0;
   bool ring_short_ = false;
   std::map<int, QueuedSample> in_force_;  // by topic: newest of a latched one that left the ring
 
-  std::vector<Tally> tallies_;  // by topic
+  std::deque<Tally> tallies_;  // by topic
   std::uint64_t messages_ = 0;
   std::uint64_t unchecked_ = 0;  // bytes since the disk was looked at
   std::optional<Error> disk_problem_;  // less free than min_free
+  std::optional<Error> snapshot_problem_;
   std::uint64_t snapshot_bytes_ = 0;
   std::vector<std::filesystem::path> bags_;
 

@@ -9,8 +9,8 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <functional>
 #include <fstream>
+#include <functional>
 
 #include "services/bag/folder_reader.hpp"
 #include "tests/support/bags.hpp"
@@ -308,7 +308,8 @@ TEST_P(BagContract, SaysWhatIsNotABag) {
   EXPECT_EQ(BagReader::open(bag_).error().code, Code::kNotFound);
   fs::create_directory(bag_);
   EXPECT_THAT(BagReader::open(bag_).error().message, HasSubstr("wanted a bag"));
-  const auto foreign = folder_.write(std::string("notes") + GetParam().extension, "These are no messages, but a text of some length.");
+  const auto foreign =
+      folder_.write(std::string("notes") + GetParam().extension, "These are no messages, but a text of some length.");
   const auto error = BagReader::open(foreign).error();
   EXPECT_EQ(error.code, Code::kInvalidArgument);
   EXPECT_THAT(error.message, HasSubstr(foreign.string()));
@@ -362,7 +363,12 @@ TEST_P(BagContract, KeepsWhatWasFlushedWhenTheWriterIsKilled) {
       [&] {
         const auto sut = writer();
         const int x = taken(sut->add_topic(string_topic("/x")));
-        for (int i = 0; i < 1000; ++i) write(*sut, x, kBegin + i, std::to_string(i));
+        sut->set_note("lost", {{"/x", "1"}});
+        for (int i = 0; i < 1000; ++i) {
+          write(*sut, x, kBegin + i, std::to_string(i));
+          if (i == 500) taken(sut->flush());
+        }
+        sut->set_note("lost", {{"/x", "2"}});
         taken(sut->flush());
         write(*sut, x, kBegin + 1000, "1000");
         raise(SIGKILL);
@@ -372,6 +378,43 @@ TEST_P(BagContract, KeepsWhatWasFlushedWhenTheWriterIsKilled) {
   const auto messages = rest_of(*saved);
   ASSERT_GE(messages.size(), 1000u);
   for (int i = 0; i < 1000; ++i) EXPECT_EQ(text_of(messages[static_cast<std::size_t>(i)].data), std::to_string(i));
+  EXPECT_EQ(saved->info().notes.at("lost"), (bag::Note{{"/x", "2"}}));
+}
+
+// Killed in the middle of whatever it does, not where it is convenient.
+TEST_P(BagContract, KeepsWhatWasFlushedWheneverTheWriterIsKilled) {
+  for (int round = 1; round <= 8; ++round) {
+    SCOPED_TRACE(round);
+    const fs::path bag = folder_.path() / ("killed-" + std::to_string(round));
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      const auto sut = taken(BagWriter::create(bag, GetParam().options));
+      const int x = taken(sut->add_topic(string_topic("/x")));
+      for (int count = 0;; ++count) {
+        write(*sut, x, kBegin + count, std::to_string(count));
+        if (count % 97 != 96) continue;
+        taken(sut->flush());
+        const int flushed = count + 1;
+        if (::write(ends[1], &flushed, sizeof flushed) != sizeof flushed) _exit(1);
+      }
+    }
+    close(ends[1]);
+    int flushed = 0;
+    for (int i = 0; i < round * round; ++i) {
+      ASSERT_EQ(read(ends[0], &flushed, sizeof flushed), static_cast<ssize_t>(sizeof flushed));
+    }
+    kill(child, SIGKILL);
+    while (read(ends[0], &flushed, sizeof flushed) == static_cast<ssize_t>(sizeof flushed)) continue;
+    close(ends[0]);
+    ASSERT_EQ(waitpid(child, nullptr, 0), child);
+    const auto saved = taken(bag::open_bag(bag, true));
+    const auto messages = rest_of(*saved);
+    ASSERT_GE(messages.size(), static_cast<std::size_t>(flushed));
+    for (std::size_t i = 0; i < messages.size(); ++i) ASSERT_EQ(text_of(messages[i].data), std::to_string(i));
+  }
 }
 
 // The limit on a file's size, its signal ignored, stands for a full disk: write() takes what
@@ -394,7 +437,9 @@ TEST_P(BagContract, EndsAtItsLastWholeChunkWhenTheDiskIsFull) {
         }
         if (ok) throw std::runtime_error("the limit has no effect");
         if (ok.error().code != Code::kIo) throw std::runtime_error(ok.error().message);
-        if (ok.error().message.find(file(0).string()) == std::string::npos) throw std::runtime_error(ok.error().message);
+        if (ok.error().message.find(file(0).string()) == std::string::npos) {
+          throw std::runtime_error(ok.error().message);
+        }
         if (sut->write(x, {.log_time = kBegin})) throw std::runtime_error("it goes on after a failure");
         taken(sut->close());
       },
@@ -431,7 +476,9 @@ TEST_P(BagContract, IsCompletedOnAFullDisk) {
     fs::remove(folder_.path() / "another's");
     const auto back = reader();
     const auto messages = rest_of(*back);
-    if (messages.size() < 1000 || messages.size() != back->info().messages) throw std::runtime_error("messages are missing");
+    if (messages.size() < 1000 || messages.size() != back->info().messages) {
+      throw std::runtime_error("messages are missing");
+    }
   };
   int status = 0;
   in_child(work, [&](int ended) {

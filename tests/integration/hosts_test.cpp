@@ -154,5 +154,24 @@ INSTANTIATE_TEST_SUITE_P(, Unplugged, ::testing::Values(LinkQuality{}, kBadCable
   return quality.param.perfect() ? "OverGoodCables" : "OverBadCables";
 });
 
+// As at boot, when programs are often faster than the network.
+TEST_F(SeveralHosts, WorkerThatStartedWithoutANetworkIsUsedOnceThereIsOne) {
+  constexpr int kIterations = 8;
+  connect();
+  hosts->plug(kSecond, false);
+  start_workers();
+  ASSERT_TRUE(workers.back()->says("rollouts at a time", kPatience)) << workers.back()->err();
+
+  hosts->plug(kSecond, true);
+  ASSERT_TRUE(workers.back()->says("joins again", kPatience)) << workers.back()->err();
+  hosts->plug(kFirst, false);
+  start_plan(kIterations);
+  ASSERT_TRUE(run->wait(kPatience)) << run->err();
+
+  ASSERT_THAT(run->out(), HasSubstr("first plan")) << run->err();
+  EXPECT_TRUE(report("together.json")["used_workers"].contains("host-3"));
+  EXPECT_EQ(report("together.json")["plan_hash"], plan_of_one_host(kIterations));
+}
+
 }  // namespace
 }  // namespace jostle::tests

@@ -25,8 +25,11 @@ inline Bytes cdr_of(const std::string& text) {
   return bytes;
 }
 
+/// The reverse. On the wire up to three bytes of padding come behind it.
 inline std::string text_of(const Bytes& cdr) {
-  return cdr.size() < 9 ? "" : std::string(reinterpret_cast<const char*>(cdr.data()) + 8, cdr.size() - 9);
+  if (cdr.size() < 9) return "";
+  const auto* text = reinterpret_cast<const char*>(cdr.data()) + 8;
+  return {text, strnlen(text, cdr.size() - 8)};
 }
 
 /// That do not compress: the tail of a linear congruential generator, one per seed.

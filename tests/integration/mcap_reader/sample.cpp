@@ -26,9 +26,9 @@ bag::Topic topic(const std::string& name, const std::string& type, const dds::Qo
 }
 
 Result<void> write(const std::string& folder, const std::string& kind) {
-  auto writer_result = bag::BagWriter::create(folder, {
-      .storage = kind == "sqlite3" ? bag::BagOptions::Storage::kSqlite : bag::BagOptions::Storage::kMcap,
-      .compress = kind != "raw"});
+  auto writer_result = bag::BagWriter::create(
+      folder, {.storage = kind == "sqlite3" ? bag::BagOptions::Storage::kSqlite : bag::BagOptions::Storage::kMcap,
+               .compress = kind != "raw"});
   if (!writer_result) return writer_result.error();
   bag::BagWriter& writer = **writer_result;
   const auto pose_result = writer.add_topic(topic("/goal", "geometry_msgs/msg/Pose", dds::kLatched));
@@ -38,7 +38,9 @@ Result<void> write(const std::string& folder, const std::string& kind) {
   const auto unused_result = writer.add_topic(topic("/plan", "jostle_msgs/msg/Plan", dds::kState));
   if (!unused_result) return unused_result.error();
   const auto pose = bytes_of({1, 2, 3, 0, 0, 0, 1});
-  if (auto ok = writer.write(*pose_result, {.log_time = kBegin, .publish_time = kBegin - 7, .data = pose}); !ok) return ok;
+  if (auto ok = writer.write(*pose_result, {.log_time = kBegin, .publish_time = kBegin - 7, .data = pose}); !ok) {
+    return ok;
+  }
   for (int i = 0; i < kCount; ++i) {
     const bag::Time time = kBegin + bag::Time{i} * 5'000'000;
     const auto point = bytes_of({static_cast<double>(i), -0.5, 1e-300});

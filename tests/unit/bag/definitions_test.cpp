@@ -1,11 +1,12 @@
 // Definitions of our messages as text, and what they decode.
 
+#include "services/bag/definitions.hpp"
+
 #include <gmock/gmock.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "services/bag/definitions.hpp"
 #include "tests/support/bags.hpp"
 
 namespace jostle::tests {
@@ -48,24 +49,30 @@ TEST(DefinitionOf, IsAMessageFileWithItsPartsBehindIt) {
   EXPECT_EQ(definition_of("geometry_msgs/msg/PoseStamped"),
             "std_msgs/Header header\n"
             "geometry_msgs/Pose pose\n" +
-                std::string(80, '=') + "\nMSG: std_msgs/Header\n"
-            "builtin_interfaces/Time stamp\n"
-            "string frame_id\n" +
-                std::string(80, '=') + "\nMSG: builtin_interfaces/Time\n"
-            "int32 sec  # since the Unix epoch\n"
-            "uint32 nanosec  # [0, 10^9)\n" +
-                std::string(80, '=') + "\nMSG: geometry_msgs/Pose\n"
-            "geometry_msgs/Point position\n"
-            "geometry_msgs/Quaternion orientation\n" +
-                std::string(80, '=') + "\nMSG: geometry_msgs/Point\n"
-            "float64 x  # m\nfloat64 y\nfloat64 z\n" +
-                std::string(80, '=') + "\nMSG: geometry_msgs/Quaternion\n"
-            "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n");
+                std::string(80, '=') +
+                "\nMSG: std_msgs/Header\n"
+                "builtin_interfaces/Time stamp\n"
+                "string frame_id\n" +
+                std::string(80, '=') +
+                "\nMSG: builtin_interfaces/Time\n"
+                "int32 sec  # since the Unix epoch\n"
+                "uint32 nanosec  # [0, 10^9)\n" +
+                std::string(80, '=') +
+                "\nMSG: geometry_msgs/Pose\n"
+                "geometry_msgs/Point position\n"
+                "geometry_msgs/Quaternion orientation\n" +
+                std::string(80, '=') +
+                "\nMSG: geometry_msgs/Point\n"
+                "float64 x  # m\nfloat64 y\nfloat64 z\n" +
+                std::string(80, '=') +
+                "\nMSG: geometry_msgs/Quaternion\n"
+                "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n");
 }
 
 TEST(DefinitionOf, KeepsWhatCommentsSay) {
-  EXPECT_THAT(*definition_of("jostle_msgs/msg/ObjectState"),
-              StartsWith("# Pose X_WB and velocity of body B.\nstring name\ngeometry_msgs/Pose pose  # world frame, m\n"));
+  EXPECT_THAT(
+      *definition_of("jostle_msgs/msg/ObjectState"),
+      StartsWith("# Pose X_WB and velocity of body B.\nstring name\ngeometry_msgs/Pose pose  # world frame, m\n"));
   EXPECT_THAT(*definition_of("jostle_msgs/msg/VelocityCommand"), HasSubstr("float64[<=64] velocities"));
   EXPECT_THAT(*definition_of("sensor_msgs/msg/CameraInfo"), HasSubstr("float64[9] k\n"));
 }
@@ -73,9 +80,10 @@ TEST(DefinitionOf, KeepsWhatCommentsSay) {
 TEST(DefinitionOf, IsThereForEveryMessageOfIdlAndDecodable) {
   const auto types = bag::known_types();
   ASSERT_GT(types.size(), 50u);
-  for (const char* type : {"jostle_msgs/msg/Plan", "jostle_msgs/msg/Task", "jostle_msgs/msg/GoalResult", "tf2_msgs/msg/TFMessage",
-                           "sensor_msgs/msg/PointCloud2", "visualization_msgs/msg/MarkerArray", "nav_msgs/msg/Odometry",
-                           "rcl_interfaces/msg/Log", "diagnostic_msgs/msg/DiagnosticArray", "trajectory_msgs/msg/JointTrajectory"}) {
+  for (const char* type :
+       {"jostle_msgs/msg/Plan", "jostle_msgs/msg/Task", "jostle_msgs/msg/GoalResult", "tf2_msgs/msg/TFMessage",
+        "sensor_msgs/msg/PointCloud2", "visualization_msgs/msg/MarkerArray", "nav_msgs/msg/Odometry",
+        "rcl_interfaces/msg/Log", "diagnostic_msgs/msg/DiagnosticArray", "trajectory_msgs/msg/JointTrajectory"}) {
     EXPECT_THAT(types, Contains(type));
   }
   for (const std::string& type : types) EXPECT_TRUE(Decoder::create(type, *definition_of(type))) << type;
@@ -84,7 +92,8 @@ TEST(DefinitionOf, IsThereForEveryMessageOfIdlAndDecodable) {
 
 TEST(DefinitionsOfIdl, SayWhatIsMalformedAndWhere) {
   const auto error = [](std::string_view text) { return bag::definitions_of_idl({{"a.idl", text}}).error().message; };
-  EXPECT_THAT(error("module a {\n module msg {\n struct S {\n double;\n};\n};\n};"), HasSubstr("a.idl: line 4: got ';', wanted a name"));
+  EXPECT_THAT(error("module a {\n module msg {\n struct S {\n double;\n};\n};\n};"),
+              HasSubstr("a.idl: line 4: got ';', wanted a name"));
   EXPECT_THAT(error("struct S {};"), HasSubstr("line 1: got 'struct', wanted 'module'"));
   EXPECT_THAT(error("module a { module msg { struct S { T t; }; }; };"), HasSubstr("t: got type a/T"));
   EXPECT_THAT(error("module a { module msg { struct S { double x"), HasSubstr("wanted ';'"));
@@ -92,8 +101,10 @@ TEST(DefinitionsOfIdl, SayWhatIsMalformedAndWhere) {
 
 TEST(DecoderTest, DecodesEveryKindOfFieldInBothByteOrders) {
   const auto sut = taken(Decoder::create("a/msg/B",
-      "uint8 KIND=3\nstring TEXT = \"# no comment\"\nbool flag\nint16 small\nuint64 large\nfloat32 f\nint8[3] fixed\nstring[] names\n"
-      "Part[<=2] parts 7\nother/Time[1] time\n=====\nMSG: a/Part\nbyte b\nfloat64 d # unit\n=====\nMSG: other/msg/Time\nint32 sec\n"));
+                                         "uint8 KIND=3\nstring TEXT = \"# no comment\"\nbool flag\nint16 small\nuint64 "
+                                         "large\nfloat32 f\nint8[3] fixed\nstring[] names\n"
+                                         "Part[<=2] parts 7\nother/Time[1] time\n=====\nMSG: a/Part\nbyte b\nfloat64 d "
+                                         "# unit\n=====\nMSG: other/msg/Time\nint32 sec\n"));
   for (const bool is_little : {true, false}) {
     Cdr cdr(is_little);
     cdr.add(std::uint8_t{1}).add(std::int16_t{-2}).add(~std::uint64_t{0}).add(0.5f);
@@ -115,7 +126,13 @@ TEST(DecoderTest, DecodesAStringAndAnEmptyMessage) {
 TEST(DecoderTest, RefusesOtherBytesThanTheTypeHas) {
   const auto sut = decoder("sensor_msgs/msg/JointState");
   Cdr cdr;
-  cdr.add(std::int32_t{1}).add(std::uint32_t{2}).text("f").add(std::uint32_t{1}).text("j").add(std::uint32_t{1}).add(1.0);
+  cdr.add(std::int32_t{1})
+      .add(std::uint32_t{2})
+      .text("f")
+      .add(std::uint32_t{1})
+      .text("j")
+      .add(std::uint32_t{1})
+      .add(1.0);
   cdr.add(std::uint32_t{0}).add(std::uint32_t{1}).add(2.0);
   const Bytes& bytes = cdr.bytes();
   ASSERT_TRUE(sut.decode(bytes));
@@ -153,6 +170,9 @@ TEST(DecoderTest, RefusesMalformedDefinitions) {
   EXPECT_THAT(error("Other x"), HasSubstr("got type a/Other"));
   EXPECT_THAT(error("B[] x"), HasSubstr("contains itself"));
   EXPECT_THAT(error("wstring x"), HasSubstr("wstring"));
+  std::string deep = "T0 x\n";
+  for (int i = 0; i < 5000; ++i) deep += "===\nMSG: a/T" + std::to_string(i) + "\nT" + std::to_string(i + 1) + " x\n";
+  EXPECT_THAT(error(deep + "===\nMSG: a/T5000\nbool x\n"), HasSubstr("nested"));
 }
 
 }  // namespace

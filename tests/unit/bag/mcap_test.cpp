@@ -25,7 +25,9 @@ using ::testing::HasSubstr;
 // As other tools lay files out, which BagWriter does not.
 class McapFile : public ::testing::Test {
  protected:
-  static mcap::Schema schema() { return {.id = 1, .name = "std_msgs/msg/String", .encoding = "ros2msg", .data = "string data"}; }
+  static mcap::Schema schema() {
+    return {.id = 1, .name = "std_msgs/msg/String", .encoding = "ros2msg", .data = "string data"};
+  }
   static mcap::Channel channel(std::uint16_t id, const std::string& topic) {
     return {.id = id, .schema = 1, .topic = topic, .encoding = "cdr"};
   }
@@ -40,9 +42,12 @@ class McapFile : public ::testing::Test {
   }
   static void append_chunk(Bytes& to, const Bytes& records, const std::string& compression, const Bytes& stored,
                            bool with_crc = true) {
-    mcap::append(to, mcap::ChunkHead{.start = 0, .end = 1000, .size = records.size(),
+    mcap::append(to, mcap::ChunkHead{.start = 0,
+                                     .end = 1000,
+                                     .size = records.size(),
                                      .crc = with_crc ? bag::crc32_of(records) : 0,
-                                     .compression = compression, .stored = stored.size()});
+                                     .compression = compression,
+                                     .stored = stored.size()});
     mcap::Appender(to).bytes(stored);
   }
   static void append_end(Bytes& to) {
@@ -91,7 +96,8 @@ TEST_F(McapFile, IsReadWithEveryCompression) {
   mcap::append(records, schema());
   mcap::append(records, channel(0, "/x"));
   for (std::uint64_t i = 0; i < 100; ++i) append_message(records, 0, i, "the same text again and again");
-  for (const auto& [name, stored] : {std::pair<std::string, Bytes>{"", records}, {"lz4", lz4(records)}, {"zstd", zstd(records)}}) {
+  for (const auto& [name, stored] :
+       {std::pair<std::string, Bytes>{"", records}, {"lz4", lz4(records)}, {"zstd", zstd(records)}}) {
     Bytes bytes = beginning();
     append_chunk(bytes, records, name, stored);
     append_end(bytes);
@@ -100,7 +106,8 @@ TEST_F(McapFile, IsReadWithEveryCompression) {
   Bytes bytes = beginning();
   append_chunk(bytes, records, "xz", records);
   append_end(bytes);
-  EXPECT_THAT(BagReader::open(save(bytes)).error().message, HasSubstr("got compression 'xz', wanted zstd, lz4 or none"));
+  EXPECT_THAT(BagReader::open(save(bytes)).error().message,
+              HasSubstr("got compression 'xz', wanted zstd, lz4 or none"));
 }
 
 TEST_F(McapFile, IsReadWithoutChecksum) {
@@ -152,7 +159,8 @@ TEST_F(McapFile, SaysWhatItCannotRead) {
   Bytes bytes = beginning();
   mcap::append(bytes, mcap::Channel{.id = 1, .topic = "/x", .encoding = "json"});
   append_end(bytes);
-  EXPECT_THAT(BagReader::open(save(bytes)).error().message, HasSubstr("topic /x: got messages encoded as 'json', wanted 'cdr'"));
+  EXPECT_THAT(BagReader::open(save(bytes)).error().message,
+              HasSubstr("topic /x: got messages encoded as 'json', wanted 'cdr'"));
   bytes[5] = std::byte{'1'};
   EXPECT_THAT(BagReader::open(save(bytes)).error().message, HasSubstr("a later program wrote it"));
 }
@@ -183,12 +191,14 @@ class DamagedMcap : public McapFile, public ::testing::WithParamInterface<bool> 
  protected:
   void SetUp() override {
     const fs::path bag = folder_.path() / "bag";
-    const auto writer = taken(bag::BagWriter::create(bag, {.compress = GetParam(), .split_time = std::chrono::nanoseconds(5)}));
+    const auto writer =
+        taken(bag::BagWriter::create(bag, {.compress = GetParam(), .split_time = std::chrono::nanoseconds(5)}));
     const int map = taken(writer->add_topic(string_topic("/map", dds::kLatched)));
     const int x = taken(writer->add_topic(string_topic("/x")));
     taken(writer->write(map, {.log_time = 1, .publish_time = 1, .data = cdr_of("map")}));
     for (int i = 1; i < 9; ++i) {
-      taken(writer->write(x, {.log_time = i, .publish_time = i, .data = cdr_of(std::string(40, 'a') + std::to_string(i))}));
+      taken(writer->write(
+          x, {.log_time = i, .publish_time = i, .data = cdr_of(std::string(40, 'a') + std::to_string(i))}));
       if (i == 7) taken(writer->flush());
     }
     writer->set_note("record", {{"key", "value"}});
@@ -217,9 +227,12 @@ class DamagedMcap : public McapFile, public ::testing::WithParamInterface<bool> 
         return got;
       }
       if (!*message) break;
-      got.emplace_back((*opened)->info().topics[static_cast<std::size_t>((*message)->topic)].topic.name, (*message)->data);
+      got.emplace_back((*opened)->info().topics[static_cast<std::size_t>((*message)->topic)].topic.name,
+                       (*message)->data);
     }
-    for (int topic = 0; topic < static_cast<int>((*opened)->info().topics.size()); ++topic) (void)(*opened)->last_at(topic, 7);
+    for (int topic = 0; topic < static_cast<int>((*opened)->info().topics.size()); ++topic) {
+      (void)(*opened)->last_at(topic, 7);
+    }
     is_error_ = false;
     return got;
   }

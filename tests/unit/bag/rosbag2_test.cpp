@@ -72,9 +72,10 @@ TEST_F(Rosbag2, FindsItsTablesInOurDatabases) {
   };
   EXPECT_THAT(columns("schema"), ElementsAre("schema_version|INTEGER|1|0", "ros_distro|TEXT|0|1"));
   EXPECT_THAT(columns("metadata"), ElementsAre("id|INTEGER|1|0", "metadata_version|INTEGER|0|1", "metadata|TEXT|0|1"));
-  EXPECT_THAT(columns("topics"), ElementsAre("id|INTEGER|1|0", "name|TEXT|0|1", "type|TEXT|0|1", "serialization_format|TEXT|0|1",
-                                             "offered_qos_profiles|TEXT|0|1"));
-  EXPECT_THAT(columns("messages"), ElementsAre("id|INTEGER|1|0", "topic_id|INTEGER|0|1", "timestamp|INTEGER|0|1", "data|BLOB|0|1"));
+  EXPECT_THAT(columns("topics"), ElementsAre("id|INTEGER|1|0", "name|TEXT|0|1", "type|TEXT|0|1",
+                                             "serialization_format|TEXT|0|1", "offered_qos_profiles|TEXT|0|1"));
+  EXPECT_THAT(columns("messages"),
+              ElementsAre("id|INTEGER|1|0", "topic_id|INTEGER|0|1", "timestamp|INTEGER|0|1", "data|BLOB|0|1"));
   EXPECT_THAT(sql("SELECT name FROM sqlite_master WHERE type = 'index'"), ElementsAre("timestamp_idx"));
   EXPECT_THAT(sql("SELECT schema_version, ros_distro FROM schema"), ElementsAre("3|humble"));
   // Since Iron every row of it is taken for a bag's metadata.yaml.
@@ -86,11 +87,17 @@ TEST_F(Rosbag2, FindsItsTablesInOurDatabases) {
 TEST_F(Rosbag2, FindsItsMessagesInOurDatabases) {
   write({.storage = bag::BagOptions::Storage::kSqlite});
   Sql sql(path / "run_0.db3");
-  EXPECT_THAT(sql("SELECT hex(data), timestamp, topics.name, messages.id FROM messages JOIN topics ON messages.topic_id = topics.id "
+  EXPECT_THAT(sql("SELECT hex(data), timestamp, topics.name, messages.id FROM messages JOIN topics ON "
+                  "messages.topic_id = topics.id "
                   "WHERE (timestamp >= 0) ORDER BY messages.timestamp, messages.id LIMIT 2"),
-              ElementsAre("00010000040000006D617000|100|/map|1", "000100000200000078" "00|110|/x|2"));
-  EXPECT_THAT(sql("SELECT name, type, serialization_format, COUNT(messages.id), MIN(messages.timestamp), MAX(messages.timestamp), "
-                  "offered_qos_profiles = '" + bag::qos_text(dds::kStream) + "' FROM messages JOIN topics ON topics.id = messages.topic_id "
+              ElementsAre("00010000040000006D617000|100|/map|1",
+                          "000100000200000078"
+                          "00|110|/x|2"));
+  EXPECT_THAT(sql("SELECT name, type, serialization_format, COUNT(messages.id), MIN(messages.timestamp), "
+                  "MAX(messages.timestamp), "
+                  "offered_qos_profiles = '" +
+                  bag::qos_text(dds::kStream) +
+                  "' FROM messages JOIN topics ON topics.id = messages.topic_id "
                   "WHERE name = '/x' GROUP BY topics.name"),
               ElementsAre("/x|std_msgs/msg/String|cdr|3|110|112|1"));
 }
@@ -104,7 +111,8 @@ TEST_F(Rosbag2, ReadsOurMetadata) {
   EXPECT_EQ(root["storage_identifier"].as<std::string>(), "mcap");
   EXPECT_EQ(root["duration"]["nanoseconds"].as<std::uint64_t>(), 12u);
   EXPECT_EQ(root["starting_time"]["nanoseconds_since_epoch"].as<std::uint64_t>(), 100u);
-  EXPECT_EQ(root["message_count"].as<std::uint64_t>(), 5u) << "as a plain reader of both files counts: the map stands in each";
+  EXPECT_EQ(root["message_count"].as<std::uint64_t>(), 5u)
+      << "as a plain reader of both files counts: the map stands in each";
   const YAML::Node topic = root["topics_with_message_count"][0];
   EXPECT_EQ(topic["topic_metadata"]["name"].as<std::string>(), "/map");
   EXPECT_EQ(topic["topic_metadata"]["type"].as<std::string>(), "std_msgs/msg/String");
@@ -113,7 +121,8 @@ TEST_F(Rosbag2, ReadsOurMetadata) {
   EXPECT_EQ(topic["message_count"].as<std::uint64_t>(), 2u);
   EXPECT_EQ(root["compression_format"].as<std::string>(), "");
   EXPECT_EQ(root["compression_mode"].as<std::string>(), "");
-  EXPECT_EQ(root["relative_file_paths"].as<std::vector<std::string>>(), (std::vector<std::string>{"run_0.mcap", "run_1.mcap"}));
+  EXPECT_EQ(root["relative_file_paths"].as<std::vector<std::string>>(),
+            (std::vector<std::string>{"run_0.mcap", "run_1.mcap"}));
   EXPECT_EQ(root["files"][1]["path"].as<std::string>(), "run_1.mcap");
   EXPECT_EQ(root["files"][1]["starting_time"]["nanoseconds_since_epoch"].as<std::uint64_t>(), 111u);
   EXPECT_EQ(root["files"][1]["duration"]["nanoseconds"].as<std::uint64_t>(), 1u);
@@ -122,19 +131,29 @@ TEST_F(Rosbag2, ReadsOurMetadata) {
 }
 
 TEST_F(Rosbag2, WroteDatabasesOfEveryVersionThatWeRead) {
-  const std::string topics = "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL";
-  const std::string messages = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB NOT NULL);"
-                               "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
-                               "INSERT INTO messages VALUES (1, 5, 30, x'0001000002000000' || x'6200'), (2, 5, 20, x'00010000020000006100');";
-  const std::string schema = "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);"
-                             "CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);";
+  const std::string topics =
+      "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT "
+      "NOT NULL, offered_qos_profiles TEXT NOT NULL";
+  const std::string messages =
+      "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB "
+      "NOT NULL);"
+      "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
+      "INSERT INTO messages VALUES (1, 5, 30, x'0001000002000000' || x'6200'), (2, 5, 20, x'00010000020000006100');";
+  const std::string schema =
+      "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);"
+      "CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);";
   const std::map<int, std::string> versions{
       {2, topics + "); INSERT INTO topics VALUES (5, '/x', 'std_msgs/msg/String', 'cdr', '');" + messages},
-      {3, schema + "INSERT INTO schema VALUES (3, 'humble');" + topics + "); INSERT INTO topics VALUES (5, '/x', 'std_msgs/msg/String', 'cdr', '');" + messages},
-      {4, schema + "INSERT INTO schema VALUES (4, 'jazzy');" + topics + ", type_description_hash TEXT NOT NULL);"
-              "INSERT INTO topics VALUES (5, '/x', 'std_msgs/msg/String', 'cdr', '- history: keep_last\n  depth: 7\n  reliability: best_effort\n  durability: transient_local\n', 'RIHS01_0');"
-              "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL, encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);"
-              "INSERT INTO message_definitions VALUES (1, 'std_msgs/msg/String', 'ros2msg', 'string data', '');" + messages}};
+      {3, schema + "INSERT INTO schema VALUES (3, 'humble');" + topics +
+              "); INSERT INTO topics VALUES (5, '/x', 'std_msgs/msg/String', 'cdr', '');" + messages},
+      {4, schema + "INSERT INTO schema VALUES (4, 'jazzy');" + topics +
+              ", type_description_hash TEXT NOT NULL);"
+              "INSERT INTO topics VALUES (5, '/x', 'std_msgs/msg/String', 'cdr', '- history: keep_last\n  depth: 7\n  "
+              "reliability: best_effort\n  durability: transient_local\n', 'RIHS01_0');"
+              "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT "
+              "NULL, encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);"
+              "INSERT INTO message_definitions VALUES (1, 'std_msgs/msg/String', 'ros2msg', 'string data', '');" +
+              messages}};
   for (const auto& [version, text] : versions) {
     SCOPED_TRACE(version);
     const fs::path file = folder.path() / (std::to_string(version) + ".db3");
@@ -143,7 +162,8 @@ TEST_F(Rosbag2, WroteDatabasesOfEveryVersionThatWeRead) {
     EXPECT_EQ(sut->info().messages, 2u);
     EXPECT_THAT(texts_of(rest_of(*sut)), ElementsAre("a", "b"));
     EXPECT_EQ(sut->info().topics[0].topic.definition, version == 4 ? "string data" : "");
-    EXPECT_EQ(sut->info().topics[0].topic.qos, version == 4 ? (dds::Qos{.reliable = false, .latched = true, .depth = 7}) : dds::Qos{});
+    EXPECT_EQ(sut->info().topics[0].topic.qos,
+              version == 4 ? (dds::Qos{.reliable = false, .latched = true, .depth = 7}) : dds::Qos{});
   }
   const fs::path later = folder.path() / "5.db3";
   Sql{later}(schema + "INSERT INTO schema VALUES (5, 'z');" + topics + ");" + messages);
@@ -175,13 +195,17 @@ TEST_F(Rosbag2, IsReadByItsMetadataAndRefusedWhenCompressed) {
 }
 
 TEST(QosText, IsReadBackAndReadsWhatOthersWrite) {
-  for (const dds::Qos& qos : {dds::kTask, dds::kCommand, dds::kAnswer, dds::kLatched, dds::kStream, dds::kState, dds::kCatalogue}) {
+  for (const dds::Qos& qos :
+       {dds::kTask, dds::kCommand, dds::kAnswer, dds::kLatched, dds::kStream, dds::kState, dds::kCatalogue}) {
     EXPECT_EQ(bag::parse_qos(bag::qos_text(qos)), qos);
   }
   // Humble: several writers of one topic, depth unknown.
-  EXPECT_EQ(bag::parse_qos("- history: 3\n  depth: 0\n  reliability: 1\n  durability: 1\n- history: 3\n  depth: 0\n  reliability: 2\n  durability: 1\n"),
+  EXPECT_EQ(bag::parse_qos("- history: 3\n  depth: 0\n  reliability: 1\n  durability: 1\n- history: 3\n  depth: 0\n  "
+                           "reliability: 2\n  durability: 1\n"),
             (dds::Qos{.reliable = false, .latched = true}));
-  for (const char* text : {"", "[]", "- [", "a", "- b: c", "- depth: many"}) EXPECT_EQ(bag::parse_qos(text).depth, dds::Qos{}.depth) << text;
+  for (const char* text : {"", "[]", "- [", "a", "- b: c", "- depth: many"}) {
+    EXPECT_EQ(bag::parse_qos(text).depth, dds::Qos{}.depth) << text;
+  }
 }
 
 }  // namespace

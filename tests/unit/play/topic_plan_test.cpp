@@ -70,6 +70,8 @@ TEST(TopicPlan, KnowsCommandsOfOthersByNameAndType) {
   EXPECT_TRUE(services::commands_somebody(typed("/arm/x", "trajectory_msgs/msg/JointTrajectory")));
   EXPECT_TRUE(services::commands_somebody(typed("/x", "geometry_msgs/msg/TwistStamped")));
   EXPECT_TRUE(services::commands_somebody(typed("/push/_action/feedback", "a_msgs/msg/B")));
+  EXPECT_TRUE(services::commands_somebody(typed("/left/robot/command", "x_msgs/msg/Y")));
+  EXPECT_TRUE(services::commands_somebody(typed("/left/task/goal", "x_msgs/msg/Y")));
   EXPECT_FALSE(services::commands_somebody(typed("/commander/state", "std_msgs/msg/String")));
   EXPECT_FALSE(services::commands_somebody(typed("/odom", "nav_msgs/msg/Odometry")));
 }

@@ -110,7 +110,7 @@ TEST_F(Doctor, FindsNothingWrongByPeers) {
 
 TEST_F(Doctor, FindsNothingWrongThroughAServer) {
   const auto server = on(kThere, "jostle_discovery_server", {});
-  ASSERT_TRUE(server->says("listens at", kPatience));
+  ASSERT_TRUE(server->says("listens at", kPatience)) << server->err();
   const std::vector<std::string> way{"--discovery", "server:10.77.0.2"};
   listen(way);
   ask(way);

@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int kWorkers = 2;            // one per host
 constexpr int kVictim = 3;             // host
 constexpr const char* kThere = "worker-1";
-constexpr int kIterations = 24;        // six seconds or so on two cores that have nothing else to do
+constexpr int kIterations = 12;        // two or three seconds on two cores that have nothing else to do
 constexpr std::chrono::milliseconds kBefore{1000};  // from a plan's first result to the unplugging
 // Shorter than silence makes a worker dead (0.5 s), longer, and longer than the
 // middleware's lease (2 s), after which the processes have to find each other again.

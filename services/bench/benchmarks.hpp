@@ -50,8 +50,8 @@ Result<Measurements> measure_hosts_scheduling(const Settings& settings);
 /// protected and an unprotected domain, microseconds and MB/s.
 Result<Measurements> measure_hosts(const Settings& settings);
 
-/// A plan while a host of workers is unplugged for a while, against the same plan left
-/// alone, seconds.
+/// Batches like a plan's, their samples waiting instead of simulating, while one of two hosts
+/// of workers is unplugged for a while, against the same left alone, seconds.
 Result<Measurements> measure_unplugged(const Settings& settings);
 
 /// One step of 1 s of every coarse model against one of the fine model, microseconds.

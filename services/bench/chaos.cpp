@@ -82,6 +82,7 @@ class Saboteur {
     }
     repair_until(Clock::time_point::max());
     done_ = true;
+    wait_for(stop);  // workers that die with their parent were started by this thread
   }
 
   void commit(const Fault& fault) {

@@ -40,7 +40,7 @@ constexpr auto kBenchmarks = std::to_array<Benchmark>({
     {"parareal-scheduling", "Parareal on 4 to 32 waiting workers against Eq. 6.4", 9, measure_parareal_scheduling},
     {"hosts", "between two hosts: round trip and throughput, protected against unprotected", 9, measure_hosts},
     {"hosts-scheduling", "waiting workers on several hosts against workers that never idle", 5, measure_hosts_scheduling},
-    {"unplugged", "a plan whose workers' host is unplugged for a while against one left alone", 5, measure_unplugged},
+    {"unplugged", "work one of whose two hosts is unplugged for a while against work left alone", 5, measure_unplugged},
 });
 
 constexpr const char* kChaos = "chaos";

@@ -21,6 +21,8 @@ namespace {
 
 // How often silence and stragglers are looked for while nothing arrives.
 constexpr std::chrono::milliseconds kTick{20};
+// Heartbeats that come so soon after the dispatcher's last turn wait for the next one.
+constexpr std::chrono::milliseconds kTogether{2};
 
 msg::BatchControl control(std::uint64_t client, Epoch epoch, ControlKind kind) {
   msg::BatchControl message;
@@ -82,7 +84,8 @@ RemotePool::RemotePool(const dds::Participant& participant, const RemotePoolOpti
                         [this](const msg::WorkerHeartbeat& heartbeat) {
                           const std::lock_guard lock(mutex_);
                           heartbeats_.push_back(heartbeat);
-                          kick();
+                          // Those of hundreds of workers, thousands a second, are absorbed several at a time.
+                          if (heartbeat.capacity() == 0 || std::chrono::steady_clock::now() > last_turn_ + kTogether) kick();
                         }),
       dispatcher_([this](std::stop_token stop) { dispatch(stop); }) {}
 
@@ -201,7 +204,7 @@ void RemotePool::dispatch(std::stop_token stop) {
   while (!stop.stop_requested()) {
     wake_.wait_for(lock, stop, active_.empty() ? kHeartbeatPeriod : kTick, [&] { return kicked_; });
     kicked_ = false;
-    const auto now = std::chrono::steady_clock::now();
+    const auto now = last_turn_ = std::chrono::steady_clock::now();
     std::vector<WorkerId> strangers;
     absorb_results(now);  // before heartbeats, which say what is still missing
     absorb_heartbeats(now, strangers);

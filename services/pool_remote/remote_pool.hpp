@@ -99,6 +99,7 @@ class RemotePool final : public physics_pool::AsyncPool {
   physics_pool::TimePoint last_usable_;
   std::string last_refusal_;
   bool ever_heard_ = false;
+  physics_pool::TimePoint last_turn_;  // of the dispatcher
   bool kicked_ = false;
 
   dds::Writer<jostle_msgs::msg::WorldDescription> world_writer_;

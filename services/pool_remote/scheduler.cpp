@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace jostle::services {
 
@@ -218,27 +219,43 @@ bool Scheduler::next_sample_of(Priority priority, Choice& choice) {
   return false;
 }
 
-bool Scheduler::next_copy(const Worker& idle, TimePoint now, Choice& choice) const {
-  bool found = false, best_runs = true;
-  TimePoint best_since;
+// Those that wait behind others first, then the oldest.
+std::vector<Scheduler::Copyable> Scheduler::copyable(TimePoint now) const {
+  std::vector<Copyable> found;
   for (const auto& [id, worker] : workers_) {
-    if (&worker == &idle) continue;
     for (std::size_t i = 0; i < worker.outstanding.size(); ++i) {
       const Outstanding& entry = worker.outstanding[i];
+      const auto age = now - entry.since;
+      const bool runs = i < static_cast<std::size_t>(worker.status.capacity);
+      if (age < options_.copy_after || (runs && age < kSlow * typical_)) continue;
       const Batch& batch = batches_.at(entry.epoch);
       const Sample& sample = batch.samples[entry.sample - batch.first_sample];
-      const bool runs = i < static_cast<std::size_t>(worker.status.capacity);
-      const auto age = now - entry.since;
-      if (sample.done || sample.copies >= kCopies || age < options_.copy_after) continue;
-      if (runs && age < kSlow * typical_) continue;
-      if (found && std::tie(runs, entry.since) >= std::tie(best_runs, best_since)) continue;
-      found = true;
-      best_runs = runs;
-      best_since = entry.since;
-      choice = {.epoch = entry.epoch, .sample = entry.sample};
+      if (sample.done || sample.copies >= kCopies) continue;
+      found.push_back({.runs = runs, .since = entry.since, .choice = {.epoch = entry.epoch, .sample = entry.sample}, .holder = id});
     }
   }
+  std::ranges::stable_sort(found, {}, [](const Copyable& copy) { return std::pair(copy.runs, copy.since); });
   return found;
+}
+
+bool Scheduler::idle(const Worker& worker, TimePoint now) const {
+  return usable(worker, now) && worker.outstanding.size() + worker.others < static_cast<std::size_t>(worker.status.capacity);
+}
+
+// The list is made once: with hundreds of idle workers at the end of a batch, one search
+// for each would keep the dispatcher from hearing what comes back.
+void Scheduler::assign_copies(TimePoint now, std::vector<Assignment>& assignments) {
+  std::vector<Copyable> copies;
+  bool known = false;
+  for (auto& [id, worker] : workers_) {
+    while (idle(worker, now)) {
+      if (!std::exchange(known, true)) copies = copyable(now);
+      const auto copy = std::ranges::find_if(copies, [&](const Copyable& candidate) { return candidate.holder != id; });
+      if (copy == copies.end()) break;
+      give(id, worker, copy->choice, now, assignments);
+      copies.erase(copy);
+    }
+  }
 }
 
 void Scheduler::give(WorkerId id, Worker& worker, const Choice& choice, TimePoint now,
@@ -265,13 +282,7 @@ std::vector<Assignment> Scheduler::assign(TimePoint now) {
     if (!next_sample(choice)) break;
     give(entry->first, entry->second, choice, now, assignments);
   }
-  for (auto& [id, worker] : workers_) {
-    while (usable(worker, now) &&
-           worker.outstanding.size() + worker.others < static_cast<std::size_t>(worker.status.capacity) &&
-           next_copy(worker, now, choice)) {
-      give(id, worker, choice, now, assignments);
-    }
-  }
+  assign_copies(now, assignments);
   return assignments;
 }
 

@@ -131,14 +131,24 @@ class Scheduler {
     std::uint32_t sample = 0;
   };
 
+  /// An outstanding sample that an idle worker may run as well.
+  struct Copyable {
+    bool runs = false;  // else it waits behind another
+    TimePoint since;
+    Choice choice;
+    WorkerId holder = 0;
+  };
+
   bool usable(const Worker& worker, TimePoint now) const;
+  bool idle(const Worker& worker, TimePoint now) const;
   int room(const Worker& worker) const;
   void take_back(Worker& worker, TimePoint sent_before);
   void release(const Outstanding& outstanding);
   std::pair<const WorkerId, Worker>* least_loaded(TimePoint now);
   bool next_sample(Choice& choice);
   bool next_sample_of(physics_pool::Priority priority, Choice& choice);
-  bool next_copy(const Worker& worker, TimePoint now, Choice& choice) const;
+  std::vector<Copyable> copyable(TimePoint now) const;
+  void assign_copies(TimePoint now, std::vector<Assignment>& assignments);
   void give(WorkerId id, Worker& worker, const Choice& choice, TimePoint now,
             std::vector<Assignment>& assignments);
 

@@ -16,7 +16,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kGlance{500};
+constexpr milliseconds kGlance{200};
 
 // Goes on while the machine sleeps, as steady_clock does not.
 milliseconds now() {

@@ -18,7 +18,7 @@ std::set<std::string> reachable_addresses();
 ///   there is an address that was not there all the time since `known`: the network came
 ///   up, or a cable was out and is in again
 ///   this process did not run for longer than `pause`: it was stopped, or the machine slept
-/// Looks twice a second.
+/// Looks five times a second.
 std::string wait_until_forgotten(std::set<std::string> known, std::chrono::milliseconds pause, std::stop_token stop);
 
 }  // namespace jostle::services

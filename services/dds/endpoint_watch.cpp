@@ -24,12 +24,19 @@ Endpoint describe(Endpoint::Kind kind, const ProxyData& data) {
 }  // namespace
 
 struct EndpointWatch::Impl : eprosima::fastdds::dds::DomainParticipantListener {
-  void on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant*, WriterDiscoveryInfo&& info) override {
+  void on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant* self, WriterDiscoveryInfo&& info) override {
+    if (is_own(*self, info.info.guid())) return;
     report(describe(Endpoint::Kind::kWriter, info.info), info.status == WriterDiscoveryInfo::REMOVED_WRITER);
   }
 
-  void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant*, ReaderDiscoveryInfo&& info) override {
+  void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant* self, ReaderDiscoveryInfo&& info) override {
+    if (is_own(*self, info.info.guid())) return;
     report(describe(Endpoint::Kind::kReader, info.info), info.status == ReaderDiscoveryInfo::REMOVED_READER);
+  }
+
+  // The middleware tells of its own endpoints, too.
+  static bool is_own(const eprosima::fastdds::dds::DomainParticipant& self, const GUID_t& endpoint) {
+    return self.guid().guidPrefix == endpoint.guidPrefix;
   }
 
   void report(const Endpoint& endpoint, bool gone) const {

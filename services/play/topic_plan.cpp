@@ -20,9 +20,10 @@ constexpr std::array<std::string_view, 12> kCommandWords{
     "command", "commands",        "cmd",  "cmd_vel", "cmd_vel_stamped", "goal", "goal_pose",
     "cancel",  "joint_trajectory", "trigger", "initialpose", "emergency_stop"};
 
+// Whole packages end in a slash.
 constexpr std::array<std::string_view, 7> kCommandTypes{
-    "jostle_msgs/msg/VelocityCommand", "jostle_msgs/msg/Goal",     "jostle_msgs/msg/Cancel",
-    "trajectory_msgs/msg/",            "geometry_msgs/msg/Twist", "geometry_msgs/msg/Wrench", "control_msgs/msg/"};
+    "jostle_msgs/msg/VelocityCommand", "jostle_msgs/msg/Goal",           "jostle_msgs/msg/Cancel",  "trajectory_msgs/msg/",
+    "geometry_msgs/msg/Twist",         "geometry_msgs/msg/TwistStamped", "control_msgs/msg/"};
 
 std::string last_word(const std::string& topic) { return topic.substr(topic.rfind('/') + 1); }
 
@@ -81,7 +82,9 @@ bool commands_somebody(const bag::Topic& topic) {
   }
   return topic.name.starts_with("/pool/") || topic.name.find("/_action/") != std::string::npos ||
          std::ranges::count(kCommandWords, last_word(topic.name)) > 0 ||
-         std::ranges::any_of(kCommandTypes, [&](std::string_view type) { return topic.type.starts_with(type); });
+         std::ranges::any_of(kCommandTypes, [&](std::string_view type) {
+           return type.ends_with('/') ? topic.type.starts_with(type) : topic.type == type;
+         });
 }
 
 Result<TopicPlan> plan_topics(const bag::BagInfo& bag, const TopicChoice& choice) {

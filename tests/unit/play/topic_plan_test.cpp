@@ -73,6 +73,8 @@ TEST(TopicPlan, KnowsCommandsOfOthersByNameAndType) {
   EXPECT_TRUE(services::commands_somebody(typed("/left/robot/command", "x_msgs/msg/Y")));
   EXPECT_TRUE(services::commands_somebody(typed("/left/task/goal", "x_msgs/msg/Y")));
   EXPECT_FALSE(services::commands_somebody(typed("/commander/state", "std_msgs/msg/String")));
+  EXPECT_FALSE(services::commands_somebody(typed("/task/result", "jostle_msgs/msg/GoalResult")));
+  EXPECT_FALSE(services::commands_somebody(typed("/odom_twist", "geometry_msgs/msg/TwistWithCovarianceStamped")));
   EXPECT_FALSE(services::commands_somebody(typed("/odom", "nav_msgs/msg/Odometry")));
 }
 

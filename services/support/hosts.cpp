@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <condition_variable>
 #include <cstdlib>
 #include <cstring>
@@ -20,12 +21,15 @@
 #include <system_error>
 #include <thread>
 
+#include "services/support/presence.hpp"
+
 namespace jostle::services {
 namespace {
 
 // Frames a TAP device holds for us: a message of 1 MiB is 700 of them, and the thread
 // that fetches them may be late on a busy machine.
 constexpr int kQueue = 10'000;
+constexpr std::chrono::seconds kCablePatience{10};
 
 int check(int result, const char* what) {
   if (result < 0) throw std::system_error(errno, std::generic_category(), what);
@@ -51,6 +55,16 @@ int new_tap(const std::string& name) {
   }
   ip(fmt::format("link set {} txqueuelen {}", name, kQueue));
   return tap;
+}
+
+// The kernel says up to a second late that a cable is in. Until then the middleware sees no
+// network, and a discovery server cannot be made.
+void wait_for_cable(const std::string& address) {
+  const auto deadline = std::chrono::steady_clock::now() + kCablePatience;
+  while (!reachable_addresses().contains(address)) {
+    if (std::chrono::steady_clock::now() > deadline) throw std::runtime_error("no cable is seen at " + address);
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
 }
 
 }  // namespace
@@ -143,6 +157,7 @@ void Hosts::build(int count, const LinkQuality& quality) {
     plug(host, true);
   }
   if (cables_) cables_->start();
+  for (int host = 1; host <= count; ++host) on(host, [&] { wait_for_cable(address(host)); });
 }
 
 // A cable that is perfect is the kernel's, and costs no thread.

@@ -106,13 +106,6 @@ class Saboteur {
   // Ours until we wait for it, which only happens here.
   pid_t pid_of(const Fault& fault) const { return helpers_.pid(static_cast<std::size_t>(fault.target)); }
 
-  static void pause_until(Clock::time_point time, std::stop_token stop) {
-    std::mutex unshared;
-    std::condition_variable_any never;
-    std::unique_lock lock(unshared);
-    never.wait_until(lock, stop, time, [] { return false; });
-  }
-
   const std::vector<Fault> schedule_;
   Helpers& helpers_;
   const Hosts* const hosts_;  // null: nothing to unplug

@@ -11,6 +11,7 @@
 #include "services/bench/several_hosts.hpp"
 #include "services/bench/swarm.hpp"
 #include "services/bench/workload.hpp"
+#include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
@@ -54,14 +55,6 @@ class Ear {
   std::condition_variable_any heard_;
   Clock::time_point newest_, newest_there_;
 };
-
-// Returns early when told to stop.
-void pause_until(Clock::time_point time, std::stop_token stop) {
-  std::mutex unshared;
-  std::condition_variable_any never;
-  std::unique_lock lock(unshared);
-  never.wait_until(lock, stop, time, [] { return false; });
-}
 
 // What a plan asks of a pool.
 class Work {

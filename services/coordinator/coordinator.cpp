@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "services/support/program.hpp"
 #include "services/world_link/messages.hpp"
 #include "services/world_link/world_client.hpp"
 
@@ -195,9 +196,7 @@ void Coordinator::note(const planners::Progress& progress, const physics_pool::T
 }
 
 void Coordinator::publish_feedback(std::stop_token stop) {
-  std::mutex sleeping;
-  std::condition_variable_any asleep;
-  while (!stop.stop_requested()) {
+  do {
     const physics_pool::PoolStatus pool = pool_.status();
     jostle_msgs::msg::Feedback feedback;
     {
@@ -219,9 +218,7 @@ void Coordinator::publish_feedback(std::stop_token stop) {
       feedback.workers().push_back(std::move(report));
     }
     feedback_writer_.write(feedback);
-    std::unique_lock lock(sleeping);
-    asleep.wait_for(lock, stop, kFeedbackPeriod, [] { return false; });
-  }
+  } while (pause_until(steady_clock::now() + kFeedbackPeriod, stop));
 }
 
 }  // namespace jostle::services

@@ -8,6 +8,7 @@
 
 #include "idl/convert/pool.hpp"
 #include "services/pool_remote/protocol.hpp"
+#include "services/support/program.hpp"
 
 namespace jostle::services {
 
@@ -247,15 +248,11 @@ void WorkerService::cancel(const BatchId& batch) {
 }
 
 void WorkerService::beat(std::stop_token stop) {
-  std::mutex unshared;
-  std::condition_variable_any never;
-  std::unique_lock lock(unshared);
-  while (!stop.stop_requested()) {
+  do {
     const std::vector<std::uint64_t> clients = result_writer_.matched_participants();
     drop_lost_clients(clients);
     heartbeat_writer_.write(heartbeat(clients));
-    never.wait_for(lock, stop, kHeartbeatPeriod, [] { return false; });
-  }
+  } while (pause_until(std::chrono::steady_clock::now() + kHeartbeatPeriod, stop));
   msg::WorkerHeartbeat leave = heartbeat({});
   leave.capacity(0);
   heartbeat_writer_.write(leave);

@@ -1,7 +1,6 @@
 #include "services/replay/recorded_world.hpp"
 
-#include <condition_variable>
-
+#include "services/support/program.hpp"
 
 namespace jostle::services {
 
@@ -20,12 +19,8 @@ Result<void> RecordedWorld::advance(std::stop_token stop) {
   ++at_;
   if (rate_ <= 0) return {};
   const std::chrono::duration<double> since(static_cast<double>(run_.observed[at_] - run_.observed[0]) * 1e-9 / rate_);
-  std::mutex sleeping;
-  std::condition_variable_any asleep;
-  std::unique_lock lock(sleeping);
-  asleep.wait_until(lock, stop, start_ + std::chrono::duration_cast<std::chrono::nanoseconds>(since), [] { return false; });
-  if (stop.stop_requested()) return Error{Code::kCancelled, "stopped on request"};
-  return {};
+  if (pause_until(start_ + std::chrono::duration_cast<std::chrono::nanoseconds>(since), std::move(stop))) return {};
+  return Error{Code::kCancelled, "stopped on request"};
 }
 
 Result<robot_bridge::RobotReading> RecordedWorld::Robot::read() {

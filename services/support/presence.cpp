@@ -7,9 +7,10 @@
 #include <netinet/in.h>
 #include <time.h>
 
-#include <condition_variable>
 #include <mutex>
 #include <utility>
+
+#include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
@@ -43,11 +44,8 @@ std::set<std::string> reachable_addresses() {
 }
 
 std::string wait_until_forgotten(std::set<std::string> known, milliseconds pause, std::stop_token stop) {
-  std::mutex unshared;
-  std::condition_variable_any never;
-  std::unique_lock lock(unshared);
   for (milliseconds last = now(); !stop.stop_requested();) {
-    never.wait_for(lock, stop, kGlance, [] { return false; });
+    pause_until(std::chrono::steady_clock::now() + kGlance, stop);
     const std::set<std::string> addresses = reachable_addresses();
     for (const std::string& address : addresses) {
       if (!known.contains(address)) return fmt::format("address {} is there, and was not all the time", address);

@@ -56,11 +56,14 @@ StopSignal::StopSignal() {
 
 std::stop_token StopSignal::token() const { return stop_source().get_token(); }
 
-void wait_for(std::stop_token stop) {
+void wait_for(std::stop_token stop) { pause_until(std::chrono::steady_clock::time_point::max(), std::move(stop)); }
+
+bool pause_until(std::chrono::steady_clock::time_point time, std::stop_token stop) {
   std::mutex unshared;
-  std::condition_variable_any stopped;
+  std::condition_variable_any never;
   std::unique_lock lock(unshared);
-  stopped.wait(lock, std::move(stop), [] { return false; });
+  never.wait_until(lock, stop, time, [] { return false; });
+  return !stop.stop_requested();
 }
 
 void die_with_parent(pid_t parent) {

@@ -5,6 +5,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -37,6 +38,9 @@ class StopSignal {
 
 /// Returns once a stop was requested.
 void wait_for(std::stop_token stop);
+
+/// Waits until then, or until a stop is requested: whether the time came.
+bool pause_until(std::chrono::steady_clock::time_point time, std::stop_token stop);
 
 /// Ends this process when the one that started it ends, however it ends; at once
 /// if that has happened already. `parent`: its process id; 0 does nothing.

@@ -34,6 +34,7 @@ int main(int argc, char** argv) {
     spdlog::error("{}", participant_result.error().message);
     return kExitUsage;
   }
+  spdlog::info("{}, domain {}", participant_name(participant_result->id()), participant_result->domain());
   try {
     std::unique_ptr<physics_pool::AsyncPool> pool;
     if (pool_kind == "dds") {

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "services/support/files.hpp"
+#include "services/support/program.hpp"
 
 namespace jostle::services {
 namespace {
@@ -200,7 +201,9 @@ Result<void> Session::send_goal() {
                  fmt::format("domain {}: got another coordinator beside ours, wanted none; another run uses "
                              "this domain, set ROS_DOMAIN_ID to a free one, or --namespace to one of its own", participant_.domain())};
   }
-  const bool answers = found.size() == 1 && feedback_.last_writer() == found.front() &&
+  // Another one may be found before ours is there: it says its number when it starts.
+  const bool ours = found.size() == 1 && coordinator_process_->has_said(participant_name(found.front()));
+  const bool answers = ours && feedback_.last_writer() == found.front() &&
                        std::ranges::binary_search(results_.matched_participants(), found.front());
   if (!answers || !world_heard_) {
     if (Clock::now() < goal_deadline_) return {};

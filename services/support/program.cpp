@@ -1,5 +1,6 @@
 #include "services/support/program.hpp"
 
+#include <fmt/format.h>
 #include <csignal>
 #include <cstdlib>
 #include <pthread.h>
@@ -91,6 +92,8 @@ void add_process_options(CLI::App& app, ProcessOptions& options) {
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.add_option("--die-with-parent", options.parent, "Process id of the starter: end when it ends");
 }
+
+std::string participant_name(std::uint64_t id) { return fmt::format("participant {:016x}", id); }
 
 std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv) {
   try {

@@ -6,6 +6,7 @@
 #include <sys/types.h>
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -56,6 +57,10 @@ struct ProcessOptions {
   pid_t parent = 0;           ///< see die_with_parent
 };
 void add_process_options(CLI::App& app, ProcessOptions& options);
+
+/// "participant 00000000deadbeef": how a process says in its log who it is in a domain, for the one
+/// that started it. `id`: dds::Participant::id().
+std::string participant_name(std::uint64_t id);
 
 /// Parses the command line. An exit code if the program is to end: after --help,
 /// or with kExitUsage after wrong arguments.

@@ -15,6 +15,7 @@
 #include "services/play/playback.hpp"
 #include "services/play/terminal.hpp"
 #include "services/play/topic_plan.hpp"
+#include "services/support/live_line.hpp"
 
 namespace jostle::services {
 

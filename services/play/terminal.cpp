@@ -1,9 +1,6 @@
 #include "services/play/terminal.hpp"
 
-#include <sys/ioctl.h>
 #include <unistd.h>
-
-#include <cstdio>
 
 namespace jostle::services {
 
@@ -32,27 +29,6 @@ std::string Keyboard::read() {
   if (count > 0) return {bytes, static_cast<std::size_t>(count)};
   works_ = false;  // hung up; there is nothing to restore
   return {};
-}
-
-LiveLine::LiveLine(std::string speaker) : speaker_(std::move(speaker)), live_(isatty(STDERR_FILENO) == 1) {}
-
-LiveLine::~LiveLine() { finish(); }
-
-std::size_t LiveLine::width() const {
-  winsize size{};
-  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
-  return known ? size.ws_col - 1u : 79u;  // a character in the last column may wrap
-}
-
-void LiveLine::draw(std::string_view text) {
-  if (!live_) return;
-  fmt::print(stderr, "\r{}\033[K", text.substr(0, width()));
-  std::fflush(stderr);
-  open_ = true;
-}
-
-void LiveLine::finish() {
-  if (std::exchange(open_, false)) fmt::print(stderr, "\n");
 }
 
 }  // namespace jostle::services

@@ -9,7 +9,7 @@
 #include "idl/types/result.hpp"
 #include "services/bag/bag_reader.hpp"
 #include "services/dds/raw.hpp"
-#include "services/record/selection.hpp"
+#include "services/support/selection.hpp"
 
 namespace jostle::services {
 

@@ -1,7 +1,6 @@
 // jostle record: topics into a bag.
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -12,6 +11,7 @@
 
 #include "services/record/recorder.hpp"
 #include "services/support/files.hpp"
+#include "services/support/live_line.hpp"
 #include "services/support/program.hpp"
 
 namespace {
@@ -53,27 +53,24 @@ std::string size_text(std::uint64_t bytes) {
 class Line {
  public:
   void show(const RecordStatus& status) {
-    if (!live_) return;
     const std::lock_guard lock(mutex_);
     const double rate = (static_cast<double>(status.messages) - static_cast<double>(messages_)) / (status.seconds - seconds_);
     messages_ = status.messages;
     seconds_ = status.seconds;
-    fmt::print(stderr, "\r{:8.1f} s  {:>9} messages of {:>2} topics  {:>7.0f}/s  {:>10}  lost {}  disk free {}\033[K", status.seconds,
-               status.messages, status.topics, std::max(rate, 0.0), size_text(status.bytes), status.lost, size_text(status.free_disk));
-    open_ = true;
+    line_.draw(fmt::format("{:8.1f} s  {:>9} messages of {:>2} topics  {:>7.0f}/s  {:>10}  lost {}  disk free {}", status.seconds,
+                           status.messages, status.topics, std::max(rate, 0.0), size_text(status.bytes), status.lost,
+                           size_text(status.free_disk)));
   }
 
   template <class... T>
   void say(fmt::format_string<T...> format, T&&... values) {
     const std::lock_guard lock(mutex_);
-    if (std::exchange(open_, false)) fmt::print(stderr, "\n");
-    fmt::print(stderr, "jostle record: {}\n", fmt::format(format, std::forward<T>(values)...));
+    line_.say(format, std::forward<T>(values)...);
   }
 
  private:
-  std::mutex mutex_;  // guards the terminal
-  const bool live_ = isatty(STDERR_FILENO);
-  bool open_ = false;
+  std::mutex mutex_;  // guards the terminal: warnings come from several threads
+  LiveLine line_{"jostle record"};
   std::uint64_t messages_ = 0;
   double seconds_ = 0.0;
 };

@@ -13,7 +13,7 @@
 #include "idl/types/result.hpp"
 #include "services/bag/message.hpp"
 #include "services/dds/reader.hpp"
-#include "services/record/selection.hpp"
+#include "services/support/selection.hpp"
 
 namespace jostle::services {
 

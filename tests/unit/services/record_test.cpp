@@ -5,8 +5,8 @@
 #include <thread>
 
 #include "services/record/sample_queue.hpp"
-#include "services/record/selection.hpp"
 #include "services/record/sequence_set.hpp"
+#include "services/support/selection.hpp"
 
 namespace jostle::tests {
 namespace {

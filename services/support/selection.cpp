@@ -1,4 +1,4 @@
-#include "services/record/selection.hpp"
+#include "services/support/selection.hpp"
 
 #include <fnmatch.h>
 

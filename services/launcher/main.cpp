@@ -24,7 +24,7 @@ int show_help(const std::filesystem::path& folder) {
              "       jostle --version\n\n"
              "programs:\n");
   for (const Program& program : installed_programs(folder)) {
-    fmt::print("  {:14} {}\n", program.name, program.purpose);
+    fmt::print("  {:16} {}\n", program.name, program.purpose);
   }
   return 0;
 }

@@ -22,7 +22,7 @@ constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string
     {"keys", "make, hand out and revoke identities for protected DDS"},
     {"play", "publish what is in a bag, at any speed, from any moment"},
     {"record", "write topics into a bag"},
-    {"render", "draw states of a scene as a picture"},
+    {"render", "draw states of a scene, or a recorded run"},
     {"replay", "make the decisions of a recorded run again, and compare"},
     {"run", "start everything for a scene on this machine"},
     {"scene", "make, check, disturb and show scene files"},

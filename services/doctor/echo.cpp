@@ -13,7 +13,6 @@ using jostle_msgs::msg::Goal;
 constexpr std::size_t kQueue = 64;
 constexpr std::chrono::milliseconds kGlance{20};  // between two looks at the other direction
 constexpr std::chrono::milliseconds kAnswer{100};
-constexpr std::chrono::milliseconds kSettling{2000};  // four announcements
 
 // The pool's own promise. Not a robot's topics: every role may say these (services/security/role.cpp).
 const dds::Topic<Goal> kThere{"rt/doctor/there", dds::kTask, dds::Scope::kDomain};
@@ -39,11 +38,11 @@ bool Caller::meet(dds::TimePoint deadline) {
     if (Clock::now() >= deadline) return false;
     if (back_.matched() == 0) back_.take(Clock::now() + kGlance);  // waits: nobody has been asked yet
   }
-  // The other side may find our reader later than we found its writer, and what it answers until
-  // then is lost. Whether answers come at all is for the first real call to say.
-  const auto settled = Clock::now() + kSettling;
-  while (Clock::now() < settled && !call(1, Clock::now() + kAnswer)) {}
   return true;
+}
+
+void Caller::settle(dds::TimePoint deadline) {
+  while (Clock::now() < deadline && !call(1, Clock::now() + kAnswer)) {}
 }
 
 std::optional<std::chrono::nanoseconds> Caller::call(std::size_t bytes, dds::TimePoint deadline) {

@@ -39,6 +39,10 @@ class Caller {
   /// Whether both directions found each other by the deadline.
   bool meet(dds::TimePoint deadline);
 
+  /// Waits until something comes back, or the deadline: the other side may find our reader later than
+  /// we found its writer, and what it answers until then is lost.
+  void settle(dds::TimePoint deadline);
+
   /// Time there and back of a sample of that many bytes; nothing if it did not come back by the deadline.
   std::optional<std::chrono::nanoseconds> call(std::size_t bytes, dds::TimePoint deadline);
 

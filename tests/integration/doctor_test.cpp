@@ -18,6 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 using services::Hosts;
+using ::testing::AnyOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -68,9 +69,11 @@ class Doctor : public ::testing::Test {
   void expect_well() {
     EXPECT_EQ(code, 0) << checks.dump(2);
     EXPECT_THAT(failed(), IsEmpty()) << checks.dump(2);
-    for (const char* name : {"peer", "version", "domain", "discovery", "identity", "clock", "UDP", "UDP fragments", "participants",
-                             "small samples", "samples of 1 MiB"}) {
+    for (const char* name : {"peer", "version", "domain", "discovery", "identity", "clock", "UDP", "UDP fragments"}) {
       EXPECT_EQ(check(name)["verdict"], "ok") << check(name).dump(2);
+    }
+    for (const char* name : {"participants", "small samples", "samples of 1 MiB"}) {  // a busy machine may be slow
+      EXPECT_THAT(check(name)["verdict"], AnyOf("ok", "warn")) << check(name).dump(2);
     }
   }
 

@@ -17,11 +17,11 @@
 #include <typeinfo>
 
 #include "idl/types/hash.hpp"
-#include "idl/types/number.hpp"
 #include "services/dds/core.hpp"
 #include "services/dds/endpoint_watch.hpp"
 #include "services/dds/profiles.hpp"
 #include "services/dds/security.hpp"
+#include "services/support/domain.hpp"
 
 namespace jostle::dds {
 namespace {
@@ -38,7 +38,6 @@ constexpr std::uint32_t kSocketBuffer = 4 << 20;
 constexpr std::uint32_t kPeersPerHost = 64;
 // Bytes; several samples of 1 MiB, whose p99 was 5 ms, and 39 ms with the middleware's 512 KiB.
 constexpr std::uint32_t kSegment = 8 << 20;
-constexpr int kLargestDomain = 232;  // RTPS 2.2, 9.6.1.1: ports would pass 65535 beyond
 
 std::string environment(const char* variable) {
   const char* text = std::getenv(variable);
@@ -100,19 +99,38 @@ void find_by(const Discovery& discovery, DomainParticipantQos& qos) {
   }
 }
 
+// Why a UDP socket cannot be bound there; empty if it can. `shares`: with others that share, too.
+std::string why_taken(const std::string& address, std::uint16_t port, bool shares) {
+  sockaddr_in endpoint{};
+  endpoint.sin_family = AF_INET;
+  endpoint.sin_port = htons(port);
+  const int handle = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const int reuse = shares;
+  const bool ok = inet_pton(AF_INET, address.c_str(), &endpoint.sin_addr) == 1 && handle >= 0 &&
+                  setsockopt(handle, SOL_SOCKET, SO_REUSEADDR, &reuse, sizeof reuse) == 0 &&
+                  bind(handle, reinterpret_cast<const sockaddr*>(&endpoint), sizeof endpoint) == 0;
+  const std::string problem = ok ? "" : std::strerror(errno);
+  if (handle >= 0) close(handle);
+  return problem;
+}
+
 // The middleware creates a server that nobody reaches, and says nothing.
 Result<void> check_address(const ServerOptions& server) {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(server.port);
-  const int handle = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  const bool ok = inet_pton(AF_INET, server.address.c_str(), &address.sin_addr) == 1 && handle >= 0 &&
-                  bind(handle, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
-  const std::string problem = std::strerror(errno);
-  if (handle >= 0) close(handle);
-  if (ok) return {};
+  const std::string problem = why_taken(server.address, server.port, false);
+  if (problem.empty()) return {};
   return Error{Code::kUnavailable, fmt::format("{}:{}: {}; wanted an address of this host (`ip address`) and a free port",
                                                server.address, server.port, problem)};
+}
+
+// Likewise a participant that hears nobody come.
+Result<void> check_multicast_port(int domain, const DomainParticipantQos& qos) {
+  const std::uint32_t port = qos.wire_protocol().port.getMulticastPort(static_cast<std::uint32_t>(domain));
+  const std::string problem = why_taken("0.0.0.0", static_cast<std::uint16_t>(port), true);
+  if (problem.empty()) return {};
+  return Error{Code::kUnavailable,
+               fmt::format("DDS domain {}: another program has its UDP port of discovery, {}: {}; wanted it free: end that program "
+                           "(`ss -ulpn`), or choose a ROS_DOMAIN_ID whose ports nobody is given, 0 to 100",
+                           domain, port, problem)};
 }
 
 void serve(const ServerOptions& server, DomainParticipantQos& qos) {
@@ -123,13 +141,6 @@ void serve(const ServerOptions& server, DomainParticipantQos& qos) {
 }
 
 }  // namespace
-
-Result<int> choose_domain(std::optional<int> wanted) {
-  const std::string text = wanted ? std::to_string(*wanted) : environment("ROS_DOMAIN_ID");
-  if (text.empty()) return 0;
-  if (const auto domain = parse_whole(text, 0, kLargestDomain)) return *domain;
-  return Error{Code::kInvalidArgument, fmt::format("{}: got '{}', wanted 0 to {}", wanted ? "--domain" : "ROS_DOMAIN_ID", text, kLargestDomain)};
-}
 
 std::vector<std::string> Participant::others() const { return core_->participant->get_participant_names(); }
 
@@ -184,7 +195,7 @@ Result<Participant> Participant::open_server(const ParticipantOptions& options, 
 }
 
 Result<Participant> Participant::create(const ParticipantOptions& options, const ServerOptions* server) {
-  auto domain_result = choose_domain(options.domain);
+  auto domain_result = services::choose_domain(options.domain);
   if (!domain_result) return domain_result.error();
   if (auto ok = load_profiles_once(); !ok) return ok.error();
   auto qos_result = make_qos(options.name);
@@ -196,6 +207,9 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
   auto discovery_result = parse_discovery(way.empty() || server ? "multicast" : way);
   if (!discovery_result) return discovery_result.error();
   find_by(*discovery_result, qos);
+  if (discovery_result->mode == Discovery::Mode::kMulticast && !server) {
+    if (auto ok = check_multicast_port(*domain_result, qos); !ok) return ok.error();
+  }
   if (server) {
     if (auto ok = check_address(*server); !ok) return ok.error();
     serve(*server, qos);

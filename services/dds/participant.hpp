@@ -23,9 +23,6 @@ struct SetupError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// `wanted`, else ROS_DOMAIN_ID, else 0. Error kInvalidArgument: says where it came from, got, wanted.
-Result<int> choose_domain(std::optional<int> wanted);
-
 struct ParticipantOptions {
   std::string name = "jostle";  ///< as tools list it
   std::optional<int> domain;    ///< 0 to 232; else ROS_DOMAIN_ID, else 0

@@ -5,6 +5,7 @@
 
 #include "services/doctor/echo.hpp"
 #include "services/doctor/facts.hpp"
+#include "services/support/domain.hpp"
 
 namespace jostle::services {
 namespace {

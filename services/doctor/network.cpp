@@ -11,6 +11,7 @@
 #include "services/dds/participant.hpp"
 #include "services/dds/profiles.hpp"
 #include "services/doctor/socket.hpp"
+#include "services/support/domain.hpp"
 
 namespace jostle::services {
 namespace {
@@ -95,9 +96,11 @@ Check check_profiles() {
 }
 
 Check check_domain(std::optional<int> wanted) {
-  const auto domain_result = dds::choose_domain(wanted);
+  const auto domain_result = choose_domain(wanted);
   if (!domain_result) return {"domain", Verdict::kFail, domain_result.error().message, "export ROS_DOMAIN_ID=0"};
-  return {"domain", Verdict::kOk, fmt::format("{}", *domain_result), ""};
+  const auto trouble = port_trouble(*domain_result);
+  if (!trouble) return {"domain", Verdict::kOk, fmt::format("{}", *domain_result), ""};
+  return {"domain", Verdict::kWarn, fmt::format("{}: {}", *domain_result, trouble->finding), trouble->remedy};
 }
 
 }  // namespace jostle::services

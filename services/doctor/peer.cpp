@@ -15,6 +15,7 @@
 #include "services/doctor/echo.hpp"
 #include "services/doctor/facts.hpp"
 #include "services/doctor/line.hpp"
+#include "services/support/domain.hpp"
 #include "services/support/statistics.hpp"
 
 namespace jostle::services {
@@ -181,7 +182,7 @@ std::vector<Check> check_datagrams(const Pair& pair) {
                                                pair.both(), kGroup, first)));
   }
   checks.push_back(check_passage(pair, "UDP", false, kSmallBytes,
-                                 fmt::format("let the firewalls of both pass UDP ports {} to {} (domain {})", first, first + 249, pair.ours.domain)));
+                                 fmt::format("let the firewalls of both pass UDP ports {} to {} (domain {})", first, first + kPortsPerDomain - 1, pair.ours.domain)));
   if (checks.back().verdict == Verdict::kOk) {
     checks.push_back(check_passage(pair, "UDP fragments", false, kFragmented,
                                    "let firewalls pass fragments of IP packets; the same MTU on both (ip link), the network's or less"));

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <vector>
 
+#include "services/support/domain.hpp"
+
 namespace jostle::services {
 namespace {
 
@@ -67,9 +69,6 @@ std::optional<in_addr> route_to(in_addr other) {
 }
 
 std::string failed_step(const std::string& step) { return step + ": " + std::strerror(errno); }
-
-int multicast_port(int domain) { return 7400 + 250 * domain; }
-int unicast_port(int domain, int participant) { return 7410 + 250 * domain + 2 * participant; }
 
 Result<Ear> Ear::open(int port, std::optional<in_addr> group_through) {
   Socket socket(SOCK_DGRAM);

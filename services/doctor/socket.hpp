@@ -58,9 +58,6 @@ std::string failed_step(const std::string& step);
 /// Fast DDS's discovery group: RTPS 2.2, Sec. 9.6.1.4.
 inline constexpr const char* kGroup = "239.255.0.1";
 
-/// UDP ports of a domain: RTPS 2.2, Sec. 9.6.1.1. `participant` counts those of a host from 0.
-int multicast_port(int domain);
-int unicast_port(int domain, int participant);
 
 /// Waits for datagrams at one port.
 class Ear {

@@ -16,6 +16,8 @@
 #include <thread>
 #include <utility>
 
+#include "services/support/domain.hpp"
+
 namespace jostle::services {
 namespace {
 
@@ -32,6 +34,13 @@ sigset_t stop_signals() {
   sigaddset(&set, SIGINT);
   sigaddset(&set, SIGTERM);
   return set;
+}
+
+// Not an error: with few programs on a host it goes well most of the time.
+void warn_of_ports(std::optional<int> wanted) {
+  const auto domain_result = choose_domain(wanted);
+  const auto trouble = domain_result ? port_trouble(*domain_result) : std::nullopt;
+  if (trouble) fmt::print(stderr, "warning: DDS domain {}: {}; better: {}\n", *domain_result, trouble->finding, trouble->remedy);
 }
 
 }  // namespace
@@ -91,6 +100,9 @@ void add_process_options(CLI::App& app, ProcessOptions& options) {
   add_network_options(app);
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.add_option("--die-with-parent", options.parent, "Process id of the starter: end when it ends");
+  app.parse_complete_callback([&options] {
+    if (options.parent == 0) warn_of_ports(options.domain);  // else the parent has
+  });
 }
 
 std::string participant_name(std::uint64_t id) { return fmt::format("participant {:016x}", id); }

@@ -1,6 +1,9 @@
 // Bad files, bad arguments and bad messages, given to a run.
 
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <cmath>
 
@@ -58,6 +61,24 @@ TEST_F(BadInput, SceneThatCannotBeIsRefusedWithFileFieldGotAndWanted) {
   expect_refused({scene_file([](Scene& s) { s.task.target = "grail"; })},
                  {spoilt, "task.target", "got 'grail'", "wanted"});
   expect_refused({scene_file([](Scene& s) { s.objects[2].name = "can"; })}, {spoilt, "objects[2]", "'can'"});
+}
+
+// As happens beyond domain 100, where Linux gives the ports to any program that wants some port.
+TEST_F(BadInput, DomainWhosePortOfDiscoveryIsTakenIsRefusedWithPortAndRemedy) {
+  const int port = 7400 + 250 * domain;
+  const int taker = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<in_port_t>(port));
+  ASSERT_EQ(bind(taker, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+
+  EXPECT_EQ(finish({easy}), 3);
+
+  close(taker);
+  for (const std::string& word : {"domain " + std::to_string(domain), std::to_string(port), std::string("ROS_DOMAIN_ID")}) {
+    EXPECT_THAT(run->err(), HasSubstr(word));
+  }
+  EXPECT_THAT(run_folders(), IsEmpty());
 }
 
 TEST_F(BadInput, ArgumentsAreRefusedWithGotAndWanted) {

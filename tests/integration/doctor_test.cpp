@@ -104,6 +104,16 @@ TEST_F(Doctor, FindsNothingWrongByMulticast) {
   EXPECT_EQ(check("10.77.0.2: worker")["verdict"], "ok") << "the other's own checks";
 }
 
+TEST_F(Doctor, WarnsOfADomainWhosePortsLinuxGivesToAnyProgram) {
+  for (const auto& [domain, verdict] : {std::pair("100", "ok"), {"150", "warn"}}) {
+    const auto doctor = on(kHere, "jostle_doctor", {"--json", "--domain", domain});
+    doctor->wait(kPatience);
+    checks = json::parse(doctor->out(), nullptr, false);
+    EXPECT_EQ(check("domain")["verdict"], verdict) << doctor->out();
+  }
+  EXPECT_THAT(check("domain")["remedy"].get<std::string>(), HasSubstr("ROS_DOMAIN_ID below 101"));
+}
+
 TEST_F(Doctor, FindsNothingWrongByPeers) {
   const std::vector<std::string> way{"--discovery", "peers:10.77.0.1,10.77.0.2"};
   listen(way);

@@ -1,7 +1,6 @@
 // jostle bench: ratios measured inside one run, on this machine.
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -14,6 +13,7 @@
 #include "services/bench/pool_timeline.hpp"
 #include "services/bench/record.hpp"
 #include "services/support/cores.hpp"
+#include "services/support/domain_claim.hpp"
 #include "services/support/files.hpp"
 #include "services/support/program.hpp"
 
@@ -137,9 +137,7 @@ int main(int argc, char** argv) {
   std::string name, json, plot;
   int worlds = CheapPhysicsOptions{}.executed_worlds;
   std::vector<std::string> parts = CheapPhysicsOptions{}.parts;
-  // Of its own, so that neither a user's system nor another benchmark is in the way.
-  Settings settings{.domain = 100 + static_cast<int>(getpid() % 100),
-                    .on_news = [](const std::string& line) { fmt::print(stderr, "{}\n", line); }};
+  Settings settings{.on_news = [](const std::string& line) { fmt::print(stderr, "{}\n", line); }};
   app.add_option("name", name, "A benchmark, or `list`")->required();
   app.add_option("--repeats", settings.repeats, "Runs of each side, batches of pool (default: the benchmark's)")
       ->check(CLI::Range(1, 100'000));
@@ -168,11 +166,18 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", recording.seconds, "Of record: how long")->capture_default_str()->check(CLI::Range(0.1, 86400.0));
   app.add_flag("--disturbance", disturbance, "Of record: the time of a plan with and without a recorder instead");
   add_network_options(app);
-  app.add_option("--domain", settings.domain, "DDS domain (default: one of 100 to 199, from the process id)")
-      ->check(CLI::Range(0, 232));
+  auto* domain = app.add_option("--domain", settings.domain, "DDS domain (default: one of its own, 1 to 100)")->check(CLI::Range(0, 232));
   app.footer("Exit codes: 0 measured, 1 the two sides computed different things, 2 bad arguments,\n"
              "3 a part of the system failed, 130 interrupted. Slowness is no failure.");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
+  // Neither a user's system nor another benchmark is in the way.
+  std::optional<OwnDomain> own;
+  if (domain->count() == 0) {
+    auto own_result = claim_some_domain();
+    if (!own_result) return fail(own_result.error(), kExitBroken);
+    own = std::move(own_result).value();
+    settings.domain = own->domain;
+  }
   const StopSignal signal;
   settings.stop = signal.token();
   try {

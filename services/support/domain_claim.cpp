@@ -15,6 +15,7 @@ namespace jostle::services {
 namespace {
 
 constexpr std::chrono::milliseconds kRetry{20};
+constexpr int kOwnDomains = 100;
 
 }  // namespace
 
@@ -54,6 +55,16 @@ DomainClaim& DomainClaim::operator=(DomainClaim&& other) noexcept {
 
 DomainClaim::~DomainClaim() {
   if (socket_ >= 0) close(socket_);
+}
+
+Result<OwnDomain> claim_some_domain() {
+  for (int i = 0; i < kOwnDomains; ++i) {
+    const int candidate = 1 + (getpid() + i) % kOwnDomains;
+    auto claim_result = DomainClaim::take("experiment", candidate, std::chrono::milliseconds(0));
+    if (claim_result) return OwnDomain{candidate, std::move(claim_result).value()};
+  }
+  return Error{Code::kUnavailable, fmt::format("DDS domains 1 to {}: all in use by tests and benchmarks of this machine; "
+                                               "wanted one, give it with --domain", kOwnDomains)};
 }
 
 }  // namespace jostle::services

@@ -31,4 +31,15 @@ class DomainClaim {
   int socket_;
 };
 
+/// A domain that nobody else on this machine who asked here has.
+struct OwnDomain {
+  int domain = 0;
+  DomainClaim claim;  ///< while it is held
+};
+
+/// From 1 to 100: beyond, a domain's UDP ports are among those that Linux gives to sockets that
+/// ask for any (from 32768), and a domain whose port of discovery is somebody's finds nobody.
+/// Error kUnavailable if all are taken.
+Result<OwnDomain> claim_some_domain();
+
 }  // namespace jostle::services

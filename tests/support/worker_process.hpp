@@ -27,19 +27,11 @@ Clock::time_point in(Duration time) {
   return Clock::now() + time;
 }
 
-/// A DDS domain that no other test process on this machine uses, 100 to 199.
+/// A DDS domain that no other test process on this machine uses; held until this one ends.
 inline int test_domain() {
-  // Held until the process ends: of tests that run side by side, process ids a multiple of
-  // 100 apart do occur.
-  static const auto [domain, claim] = [] {
-    for (int i = 0; i < 100; ++i) {
-      const int candidate = 100 + static_cast<int>((getpid() + i) % 100);
-      auto claim_result = services::DomainClaim::take("test", candidate, std::chrono::milliseconds(0));
-      if (claim_result) return std::pair(candidate, std::move(claim_result).value());
-    }
-    throw std::runtime_error("no DDS domain from 100 to 199 is free");
-  }();
-  return domain;
+  static const auto own_result = services::claim_some_domain();
+  if (!own_result) throw std::runtime_error(own_result.error().message);
+  return own_result->domain;
 }
 
 /// Whether a condition came true by the deadline.

@@ -69,5 +69,16 @@ TEST(DomainClaim, WaitsForAPredecessorThatIsEnding) {
   EXPECT_TRUE(DomainClaim::take(kRole, 9, 60s));
 }
 
+TEST(OwnDomain, IsNobodyElsesAndBelowThePortsThatLinuxHandsOut) {
+  const auto one = claim_some_domain(), other = claim_some_domain();
+  ASSERT_TRUE(one && other);
+
+  EXPECT_NE(one->domain, other->domain);
+  for (const int domain : {one->domain, other->domain}) {
+    EXPECT_GE(domain, 1);
+    EXPECT_LT(7400 + 250 * domain, 32768);
+  }
+}
+
 }  // namespace
 }  // namespace jostle::services

@@ -90,6 +90,11 @@ class Peers {
     return ids;
   }
 
+  bool include(std::uint64_t participant) const {
+    const std::lock_guard lock(mutex_);
+    return std::ranges::find(peers_, participant, participant_id) != peers_.end();
+  }
+
  private:
   mutable std::mutex mutex_;  // guards peers_
   mutable std::condition_variable changed_;

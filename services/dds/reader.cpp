@@ -112,4 +112,6 @@ ReaderTroubles ReaderBase::troubles() const {
 
 std::vector<std::uint64_t> ReaderBase::matched_participants() const { return impl_->writers.participants(); }
 
+bool ReaderBase::hears(std::uint64_t participant) const { return impl_->writers.include(participant); }
+
 }  // namespace jostle::dds

@@ -52,6 +52,9 @@ class ReaderBase {
   /// Participant::id() of every one that has a writer for us; each once, ascending.
   std::vector<std::uint64_t> matched_participants() const;
 
+  /// Whether that participant has a writer for us; the counterpart of WriterBase::reaches().
+  bool hears(std::uint64_t participant) const;
+
   ReaderTroubles troubles() const;
 
  private:
@@ -125,6 +128,7 @@ class Inbox {
 
   int matched() const { return reader_.matched(); }
   std::vector<std::uint64_t> matched_participants() const { return reader_.matched_participants(); }
+  bool hears(std::uint64_t participant) const { return reader_.hears(participant); }
 
  private:
   void put(const T& sample, std::uint64_t writer) {

@@ -80,9 +80,7 @@ bool WriterBase::wait_for_readers(TimePoint deadline, int count) const {
 
 std::vector<std::uint64_t> WriterBase::matched_participants() const { return impl_->readers.participants(); }
 
-bool WriterBase::reaches(std::uint64_t participant) const {
-  return std::ranges::binary_search(impl_->readers.participants(), participant);
-}
+bool WriterBase::reaches(std::uint64_t participant) const { return impl_->readers.include(participant); }
 
 bool WriterBase::wait_until_received(TimePoint deadline) const {
   const std::chrono::duration<double> time = deadline - std::chrono::steady_clock::now();

@@ -203,8 +203,7 @@ Result<void> Session::send_goal() {
   }
   // Another one may be found before ours is there: it says its number when it starts.
   const bool ours = found.size() == 1 && coordinator_process_->has_said(participant_name(found.front()));
-  const bool answers = ours && feedback_.last_writer() == found.front() &&
-                       std::ranges::binary_search(results_.matched_participants(), found.front());
+  const bool answers = ours && feedback_.last_writer() == found.front() && results_.hears(found.front());
   if (!answers || !world_heard_) {
     if (Clock::now() < goal_deadline_) return {};
     return Error{Code::kUnavailable,

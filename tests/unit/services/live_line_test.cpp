@@ -1,14 +1,18 @@
 #include "services/support/live_line.hpp"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "services/support/progress_line.hpp"
+
 namespace jostle::services {
 namespace {
+
+using ::testing::MatchesRegex;
 
 // Standard error is a terminal of 21 columns, or a pipe, for as long as this lives.
 class StandardError {
@@ -90,6 +94,37 @@ TEST(LiveLine, PlainLinesMayBeAskedForOnATerminal) {
   sut.draw("one");
   sut.draw("two");
   EXPECT_EQ(error.text(), "one\r\ntwo\r\n");
+}
+
+TEST(ProgressLine, ShowsTheBeginningAndTheEndOfQuickWork) {
+  const StandardError error(false);
+  {
+    ProgressLine sut({.doing = "testing", .unit = "steps", .plain = PlainLines::kElsewhere});
+    for (std::uint64_t done = 0; done <= 5000; ++done) sut.show(done, 5000);
+  }
+  EXPECT_THAT(error.text(), MatchesRegex("testing: 0 of 5000 steps \\(0 %\\)\ntesting: 5000 of 5000 steps \\(100 %\\), .* per second\n"));
+}
+
+TEST(ProgressLine, IsWipedAtTheEndIfSoAsked) {
+  const StandardError error(true);
+  { ProgressLine({.doing = "testing", .unit = "steps", .wiped = true}).show(0, 9); }
+  EXPECT_EQ(error.text(), "\rtesting: 0 of 9 step\033[K\r\033[K");
+}
+
+TEST(ProgressText, SaysShareRateAndTimeLeftWhileTheyAreKnown) {
+  EXPECT_EQ(progress_text("frames", 0, 10, 0.0), "0 of 10 frames (0 %)");
+  EXPECT_EQ(progress_text("frames", 4, 10, 2.0), "4 of 10 frames (40 %), 2.0 per second, 3 s left");
+  EXPECT_EQ(progress_text("frames", 10, 10, 5.0), "10 of 10 frames (100 %), 2.0 per second");
+  EXPECT_EQ(progress_text("frames", 4, 10, 2.0, 4), "4 of 10 frames (40 %)");
+  EXPECT_EQ(progress_text("frames", 8, 20, 2.0, 4), "8 of 20 frames (40 %), 2.0 per second, 6 s left");
+  EXPECT_EQ(progress_text("frames", 12, 10, 6.0), "12 of 10 frames (100 %), 2.0 per second");
+  EXPECT_EQ(progress_text("frames", 0, 0, 1.0), "0 of 0 frames (100 %)");
+}
+
+TEST(DurationText, HasTheUnitOneWouldSay) {
+  EXPECT_EQ(duration_text(48.2), "48 s");
+  EXPECT_EQ(duration_text(49 * 60), "49 min");
+  EXPECT_EQ(duration_text(125 * 60), "2 h 05 min");
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "idl/types/result.hpp"
+
 namespace jostle::services {
 
 struct InfoArguments {
@@ -37,5 +39,9 @@ struct ExportArguments {
 };
 /// Decoded messages. Leaves nothing behind when it is interrupted or cannot write.
 int export_bag(const ExportArguments& arguments, std::stop_token stop);
+
+/// "jostle bag: …" on standard error; the exit code for it: kExitInterrupted after kCancelled,
+/// kExitUsage for what the user named wrongly, else `otherwise`.
+int fail(const Error& error, int otherwise);
 
 }  // namespace jostle::services

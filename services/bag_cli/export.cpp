@@ -12,8 +12,8 @@
 #include "services/bag/bag_reader.hpp"
 #include "services/bag_cli/commands.hpp"
 #include "services/bag_cli/decoders.hpp"
-#include "services/bag_cli/progress.hpp"
 #include "services/support/program.hpp"
+#include "services/support/progress_line.hpp"
 
 namespace jostle::services {
 namespace {
@@ -200,11 +200,11 @@ Result<void> for_each(bag::BagReader& reader, const Decoders& decoders, const Se
                       std::stop_token stop, Use use) {
   std::uint64_t total = 0, done = 0;
   for (const int topic : selection.topics) total += reader.info().topics[static_cast<std::size_t>(topic)].messages;
-  Progress progress(what, total);
+  ProgressLine progress({.doing = what, .unit = "messages", .wiped = true});
   reader.seek(selection.from, selection.topics);
   while (true) {
     if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
-    progress.show(done++);
+    progress.show(done++, total);
     auto message_result = reader.next();
     if (!message_result) return message_result.error();
     if (!*message_result || (*message_result)->log_time > selection.to) return {};

@@ -6,7 +6,6 @@
 
 #include "services/bag/bag_reader.hpp"
 #include "services/bag_cli/commands.hpp"
-#include "services/bag_cli/progress.hpp"
 #include "services/support/program.hpp"
 
 namespace jostle::services {

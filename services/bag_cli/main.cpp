@@ -1,5 +1,7 @@
 // jostle bag: looks into recordings, checks, saves and exports them.
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <functional>
 
@@ -20,6 +22,12 @@ constexpr const char* kExample =
     "be opened, 3 output cannot be written, 130 interrupted.";
 
 }  // namespace
+
+int jostle::services::fail(const Error& error, int otherwise) {
+  fmt::print(stderr, "jostle bag: {}\n", error.message);
+  if (error.code == Code::kCancelled) return kExitInterrupted;
+  return error.code == Code::kNotFound ? kExitUsage : otherwise;
+}
 
 int main(int argc, char** argv) {
   using namespace jostle::services;

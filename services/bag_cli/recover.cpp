@@ -5,8 +5,8 @@
 #include "services/bag/bag_writer.hpp"
 #include "services/bag/folder_reader.hpp"
 #include "services/bag_cli/commands.hpp"
-#include "services/bag_cli/progress.hpp"
 #include "services/support/program.hpp"
+#include "services/support/progress_line.hpp"
 
 namespace jostle::services {
 namespace {
@@ -28,10 +28,10 @@ Result<std::uint64_t> copy(bag::CheckedReader& from, bag::BagWriter& to, std::st
     topics.push_back(*index_result);
   }
   std::uint64_t done = 0;
-  Progress progress("recovering", from.info().messages);
+  ProgressLine progress({.doing = "recovering", .unit = "messages", .wiped = true});
   while (true) {
     if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
-    progress.show(done);
+    progress.show(done, from.info().messages);
     auto message_result = from.next();
     if (!message_result) return message_result.error();
     if (!*message_result) return done;

@@ -5,8 +5,8 @@
 #include "services/bag/folder_reader.hpp"
 #include "services/bag_cli/commands.hpp"
 #include "services/bag_cli/decoders.hpp"
-#include "services/bag_cli/progress.hpp"
 #include "services/support/program.hpp"
+#include "services/support/progress_line.hpp"
 
 namespace jostle::services {
 namespace {
@@ -17,10 +17,10 @@ Result<std::uint64_t> read_all(bag::BagReader& reader, const Decoders& decoders,
   std::vector<std::uint64_t> counts(info.topics.size(), 0);
   std::uint64_t done = 0;
   bag::Time before = std::numeric_limits<bag::Time>::min();
-  Progress progress("verifying", info.messages);
+  ProgressLine progress({.doing = "verifying", .unit = "messages", .wiped = true});
   while (true) {
     if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
-    progress.show(done);
+    progress.show(done, info.messages);
     auto message_result = reader.next();
     if (!message_result) return message_result.error();
     if (!*message_result) break;

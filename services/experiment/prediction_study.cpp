@@ -15,6 +15,7 @@
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/parareal/levels.hpp"
 #include "services/support/files.hpp"
+#include "services/support/progress_line.hpp"
 #include "services/support/statistics.hpp"
 
 namespace jostle::services {
@@ -199,8 +200,7 @@ class PredictionStudyRunner final : public Study {
       ++done;
       if (done % std::max<std::size_t>(total / 20, 1) != 0) return;
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      options.on_progress(fmt::format("[{:>4}/{}] predictions, {:.0f} s, about {:.0f} s to go", done, total, seconds,
-                                      seconds * static_cast<double>(total - done) / static_cast<double>(done)));
+      options.on_progress(progress_text("predictions", done, total, seconds));
     });
     if (options.stop.stop_requested()) return Error{Code::kCancelled, "experiment: stopped on request"};
     return report(study, cases, made);

@@ -1,7 +1,6 @@
 // jostle render: pictures and films of a scene's states, or of a recorded run.
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -10,6 +9,7 @@
 #include "services/render_cli/film.hpp"
 #include "services/render_cli/frames.hpp"
 #include "services/support/program.hpp"
+#include "services/support/progress_line.hpp"
 
 namespace jostle::services {
 namespace {
@@ -44,7 +44,10 @@ Result<Frames> load(const Arguments& arguments) {
 Result<void> run(const Arguments& arguments, std::stop_token stop) {
   auto frames_result = load(arguments);
   if (!frames_result) return frames_result.error();
-  return draw(*frames_result, arguments.output, arguments.draw, std::move(stop));
+  ProgressLine line({.doing = "drawing", .unit = "frames"});
+  DrawOptions options = arguments.draw;
+  options.on_progress = [&line](std::size_t drawn, std::size_t all) { line.show(drawn, all); };
+  return draw(*frames_result, arguments.output, options, std::move(stop));
 }
 
 }  // namespace
@@ -75,12 +78,6 @@ int main(int argc, char** argv) {
   if (!parse_size(arguments.size, arguments.draw.picture)) {
     fmt::print(stderr, "jostle render: --size: got '{}', wanted WxH such as 640x480\n", arguments.size);
     return kExitUsage;
-  }
-  if (isatty(STDERR_FILENO)) {
-    arguments.draw.on_progress = [](std::size_t drawn, std::size_t all) {
-      fmt::print(stderr, "\r{} of {} frames{}", drawn, all, drawn == all ? "\n" : "");
-      std::fflush(stderr);
-    };
   }
   const StopSignal signal;
   if (auto ok = run(arguments, signal.token()); !ok) {

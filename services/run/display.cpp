@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace jostle::services {
 namespace {
 
@@ -11,30 +13,13 @@ constexpr std::chrono::seconds kRateWindow{1};
 
 void Display::show(const jostle_msgs::msg::Feedback& feedback) {
   measure_rates(feedback);
-  if (live_) {
-    fmt::print(stderr, "\r\033[K{}", line(feedback));
-    std::fflush(stderr);
-    open_ = true;
-    return;
-  }
   const std::string news = fmt::format("{} {} {} {}", feedback.phase(), feedback.iteration(),
                                        feedback.actions(), feedback.replans());
-  if (news == last_news_) return;
-  last_news_ = news;
-  fmt::print(stderr, "{}\n", line(feedback));
+  const bool is_news = std::exchange(last_news_, news) != news;
+  if (line_.live() || is_news) line_.draw(text(feedback));
 }
 
-void Display::notice(const std::string& text) {
-  finish();
-  fmt::print(stderr, "{}\n", text);
-}
-
-void Display::finish() {
-  if (open_) fmt::print(stderr, "\n");
-  open_ = false;
-}
-
-std::string Display::line(const jostle_msgs::msg::Feedback& feedback) {
+std::string Display::text(const jostle_msgs::msg::Feedback& feedback) {
   std::string workers;
   double total = 0.0;
   for (const auto& report : feedback.workers()) {

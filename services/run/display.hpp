@@ -8,19 +8,16 @@
 #include <string>
 
 #include "services/dds/topics.hpp"
+#include "services/support/live_line.hpp"
 
 namespace jostle::services {
 
-/// One line that is drawn over and over in a terminal; a line per piece of news
-/// where the output is a file or a pipe. Writes to standard error.
+/// Draws feedback on `line`, which outlives it; as plain lines, one per piece of news.
 class Display {
  public:
-  explicit Display(bool live) : live_(live) {}
-  ~Display() { finish(); }
+  explicit Display(LiveLine& line) : line_(line) {}
 
   void show(const jostle_msgs::msg::Feedback& feedback);
-  void notice(const std::string& text);
-  void finish();  ///< leaves the last line standing
 
  private:
   struct Rate {
@@ -28,11 +25,10 @@ class Display {
     double per_second = 0.0;
   };
 
-  std::string line(const jostle_msgs::msg::Feedback& feedback);
+  std::string text(const jostle_msgs::msg::Feedback& feedback);
   void measure_rates(const jostle_msgs::msg::Feedback& feedback);
 
-  bool live_;
-  bool open_ = false;  // a live line stands without its newline
+  LiveLine& line_;
   std::chrono::steady_clock::time_point measured_;
   std::map<std::string, Rate> rates_;  // by worker
   std::string last_news_;

@@ -1,7 +1,6 @@
 // jostle run: one scene, from start to grasp or goal, on this machine.
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 
@@ -55,16 +54,17 @@ int fail(const Error& error, int code) {
 }
 
 int perform(const RunOptions& options, std::stop_token stop) {
-  Display display(!options.headless && isatty(STDERR_FILENO));
+  LiveLine line("jostle run", options.headless ? PlainLines::kAlways : PlainLines::kElsewhere);
+  Display display(line);
   auto session_result = Session::start(
       options, {.on_feedback = [&](const auto& feedback) { display.show(feedback); },
-                .on_notice = [&](const std::string& text) { display.notice(text); }});
+                .on_notice = [&](const std::string& text) { line.say("{}", text); }});
   if (!session_result) {
     return fail(session_result.error(),
                 session_result.error().code == Code::kInvalidArgument ? kExitUsage : kExitBroken);
   }
   auto result = (*session_result)->perform(stop);
-  display.finish();
+  line.finish();
   if (!result) return fail(result.error(), result.error().code == Code::kCancelled ? kExitInterrupted : kExitBroken);
   if (!result->error().empty()) return fail({Code::kUnavailable, result->error()}, kExitBroken);
   (*session_result)->finish_recording();

@@ -7,7 +7,10 @@
 
 namespace jostle::services {
 
-LiveLine::LiveLine(std::string speaker) : speaker_(std::move(speaker)), live_(isatty(STDERR_FILENO) == 1) {}
+LiveLine::LiveLine(std::string speaker, PlainLines plain)
+    : speaker_(std::move(speaker)),
+      live_(plain != PlainLines::kAlways && isatty(STDERR_FILENO) == 1),
+      plain_(plain != PlainLines::kNever && !live_) {}
 
 LiveLine::~LiveLine() { finish(); }
 
@@ -18,6 +21,7 @@ std::size_t LiveLine::width() const {
 }
 
 void LiveLine::draw(std::string_view text) {
+  if (plain_) fmt::print(stderr, "{}\n", text);
   if (!live_) return;
   fmt::print(stderr, "\r{}\033[K", text.substr(0, width()));
   std::fflush(stderr);
@@ -26,6 +30,10 @@ void LiveLine::draw(std::string_view text) {
 
 void LiveLine::finish() {
   if (std::exchange(open_, false)) fmt::print(stderr, "\n");
+}
+
+void LiveLine::wipe() {
+  if (std::exchange(open_, false)) fmt::print(stderr, "\r\033[K");
 }
 
 }  // namespace jostle::services

@@ -9,10 +9,10 @@
 #include "services/pool_remote/remote_pool.hpp"
 #include "services/support/files.hpp"
 #include "services/support/program.hpp"
+#include "services/support/progress_line.hpp"
 #include "services/train_coarse/collect.hpp"
 #include "services/train_coarse/examples.hpp"
 #include "services/train_coarse/fit.hpp"
-#include "services/train_coarse/progress.hpp"
 
 namespace jostle::services {
 namespace {
@@ -42,10 +42,12 @@ int fail(const Error& error) {
 }
 
 int collect_from(physics_pool::Pool& pool, const Arguments& arguments, std::stop_token stop) {
-  ProgressLine line("transitions");
-  const auto result = collect(pool, arguments.data, arguments.collect, stop, [&line](const CollectProgress& progress) {
-    line.show(progress.found, progress.done, progress.samples);
-  });
+  const auto result = [&] {  // the line ends before an error is told
+    ProgressLine line({.doing = "collecting", .unit = "transitions", .plain = PlainLines::kElsewhere});
+    return collect(pool, arguments.data, arguments.collect, stop, [&line](const CollectProgress& progress) {
+      line.show(progress.done, progress.samples, progress.found);
+    });
+  }();
   return result ? kExitOk : fail(result.error());
 }
 

@@ -165,16 +165,16 @@ void leave_out_strays(Index& index) {
   std::erase_if(index.blocks, [](const Block& block) { return !block.is_chunk; });
 }
 
-// The first chunk, if the file says that it repeats others.
+// One message per channel; if damage has not taken it already.
 void leave_out_repeated(Index& index) {
-  if (!index.has_repeated || index.blocks.empty()) return;
-  const auto first = std::ranges::min_element(index.blocks, {}, &Block::offset);
-  for (const auto& [channel, unused] : first->channels) {
+  const auto chunk = std::ranges::find(index.blocks, index.repeated, [](const Block& block) { return std::optional(block.offset); });
+  if (chunk == index.blocks.end()) return;
+  for (const auto& [channel, unused] : chunk->channels) {
     if (const auto count = index.counts.find(channel); count != index.counts.end() && count->second > 0) {
       --count->second;
     }
   }
-  index.blocks.erase(first);
+  index.blocks.erase(chunk);
 }
 
 // What follows from all blocks and counts.
@@ -236,7 +236,7 @@ Result<void> Index::take_metadata(const InputFile& file, const Record& record) {
   const auto metadata = parse_metadata(*body_result);
   if (!metadata) return file.damaged(record.offset, "metadata is malformed");
   if (metadata->name == kRepeatedNote) {
-    has_repeated = true;
+    repeated = record.end();
   } else {
     info.notes[metadata->name] = metadata->metadata;
   }
@@ -282,7 +282,7 @@ Result<Index> index_of(const InputFile& file, const OpenOptions& options) {
 
 Result<void> verify(const InputFile& file, const Index& index, const OpenOptions& options) {
   Index found;
-  if (auto ok = scan(file, file.size() - kTail, ScanMode::kVerify, found); !ok) return ok;
+  if (auto ok = scan(file, file.size() - std::min(file.size(), kTail), ScanMode::kVerify, found); !ok) return ok;
   if (options.skip_repeated) leave_out_repeated(found);
   for (const auto& [channel, topic] : index.topics) {
     const std::uint64_t got = found.count_of(channel), wanted = index.count_of(channel);

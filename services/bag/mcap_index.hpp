@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "idl/types/result.hpp"
@@ -29,7 +30,7 @@ struct Index {
   std::map<std::uint16_t, int> topics;            ///< of info.topics, by channel
   std::map<std::uint16_t, std::uint64_t> counts;  ///< of messages, by channel
   std::vector<Block> blocks;                      ///< as they lie in the file
-  bool has_repeated = false;                      ///< the first chunk repeats what earlier files hold
+  std::optional<std::uint64_t> repeated;          ///< offset of the chunk that repeats what earlier files hold
 
   /// A Schema or a Channel. The first of an id counts. `offset`: of the record, or of its block.
   Result<void> take_definition(const InputFile& file, Op op, View body, std::uint64_t offset);

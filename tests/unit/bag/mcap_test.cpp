@@ -9,6 +9,7 @@
 #include "services/bag/checksum.hpp"
 #include "services/bag/compression.hpp"
 #include "services/bag/folder_reader.hpp"
+#include "services/bag/mcap_file.hpp"
 #include "services/bag/mcap_format.hpp"
 #include "tests/support/bags.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -211,6 +212,21 @@ class DamagedMcap : public McapFile, public ::testing::WithParamInterface<bool> 
     ASSERT_EQ(wanted_.size(), 4u);
   }
 
+  // The second file's chunk of repeated samples, with its last byte changed.
+  void damage_repeated() {
+    const fs::path file = folder_.path() / "bag" / "bag_1.mcap";
+    std::string text = contents(file);
+    constexpr std::size_t kHead = 9;  // opcode and length
+    const auto end_of = [&](std::size_t record) {
+      std::uint64_t size = 0;
+      std::memcpy(&size, text.data() + record + 1, sizeof size);
+      return record + kHead + size;
+    };
+    const std::size_t note = text.find(bag::kRepeatedNote) - sizeof(std::uint32_t) - kHead;
+    text[end_of(end_of(note)) - 1] ^= 1;
+    std::ofstream(file, std::ios::trunc | std::ios::binary) << text;
+  }
+
   // Messages by topic name, so that an order of topics does not matter. An error must name the file.
   std::vector<std::pair<std::string, Bytes>> read(const fs::path& file) const {
     std::vector<std::pair<std::string, Bytes>> got;
@@ -294,6 +310,16 @@ TEST_P(DamagedMcap, IsVerifiedToTheLastByteOfItsData) {
   damaged[30] ^= std::byte{1};
   const auto sut = taken(bag::open_bag(save(damaged), false));
   EXPECT_THAT(sut->verify({}).error().message, HasSubstr("data: got checksum"));
+}
+
+TEST_P(DamagedMcap, LosesNothingWhereOnlyRepeatedSamplesAreDamaged) {
+  damage_repeated();
+
+  const auto sut = taken(bag::open_bag(folder_.path() / "bag", true));
+
+  EXPECT_FALSE(sut->damage().empty());
+  EXPECT_EQ(rest_of(*sut).size(), 9u);
+  EXPECT_EQ(sut->info().messages, 9u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Compressed, DamagedMcap, ::testing::Values(true));

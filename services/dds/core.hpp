@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "services/dds/guid.hpp"
+#include "services/dds/joining.hpp"
 #include "services/dds/participant.hpp"
 #include "services/dds/qos.hpp"
 
@@ -28,7 +29,8 @@ Guid to_guid(const eprosima::fastrtps::rtps::GUID_t& guid);
 
 class Participant::Core {
  public:
-  Core(eprosima::fastdds::dds::DomainParticipant* participant, int domain, std::string space);
+  /// Owns the participant.
+  Core(Joined joined, int domain, std::string space);
   ~Core();
   Core(const Core&) = delete;
   Core& operator=(const Core&) = delete;
@@ -43,12 +45,12 @@ class Participant::Core {
   eprosima::fastdds::dds::Publisher* const publisher;
   eprosima::fastdds::dds::Subscriber* const subscriber;
   const int domain;
-  std::shared_ptr<EndpointWatch> watch;  // outlives the participant that calls it
   const std::string space;  // namespace
 
  private:
   std::mutex mutex_;  // guards users_ and the creation of topics
   std::map<std::string, int> users_;
+  const std::shared_ptr<eprosima::fastdds::dds::DomainParticipantListener> listener_;  // the participant calls it
 };
 
 /// Who is at the other end of a writer or reader: the endpoints that the middleware matched

@@ -1,6 +1,9 @@
 #include "services/dds/endpoint_watch.hpp"
 
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <mutex>
+#include <utility>
+#include <vector>
 
 #include "services/dds/core.hpp"
 
@@ -39,12 +42,24 @@ struct EndpointWatch::Impl : eprosima::fastdds::dds::DomainParticipantListener {
     return self.guid().guidPrefix == endpoint.guidPrefix;
   }
 
-  void report(const Endpoint& endpoint, bool gone) const {
-    const OnEndpoint& tell = gone ? on_gone : on_found;
-    if (tell) tell(endpoint);
+  void report(const Endpoint& endpoint, bool gone) {
+    const std::lock_guard lock(mutex);  // nothing overtakes what was held back
+    if (holds) {
+      held.emplace_back(endpoint, gone);
+    } else {
+      tell(endpoint, gone);
+    }
+  }
+
+  void tell(const Endpoint& endpoint, bool gone) const {
+    const OnEndpoint& call = gone ? on_gone : on_found;
+    if (call) call(endpoint);
   }
 
   OnEndpoint on_found, on_gone;
+  std::mutex mutex;  // guards the two below, and is held while they call
+  bool holds = false;
+  std::vector<std::pair<Endpoint, bool>> held;  // with whether it went
 };
 
 EndpointWatch::EndpointWatch(OnEndpoint on_found, OnEndpoint on_gone) : impl_(std::make_unique<Impl>()) {
@@ -55,5 +70,18 @@ EndpointWatch::EndpointWatch(OnEndpoint on_found, OnEndpoint on_gone) : impl_(st
 EndpointWatch::~EndpointWatch() = default;
 
 eprosima::fastdds::dds::DomainParticipantListener& EndpointWatch::listener() { return *impl_; }
+
+void EndpointWatch::hold() {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->holds = true;
+}
+
+void EndpointWatch::let_go(bool tell) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->holds = false;
+  for (const auto& [endpoint, gone] : std::exchange(impl_->held, {})) {
+    if (tell) impl_->tell(endpoint, gone);
+  }
+}
 
 }  // namespace jostle::dds

@@ -43,6 +43,11 @@ class EndpointWatch {
 
   eprosima::fastdds::dds::DomainParticipantListener& listener();
 
+  /// Keeps what it hears to itself from now on. For join().
+  void hold();
+  /// Tells what it heard since hold(), or forgets it, and holds back nothing more.
+  void let_go(bool tell);
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

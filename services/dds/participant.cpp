@@ -225,17 +225,13 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
     }
     if (auto ok = secure(qos, identity); !ok) return ok.error();
   }
-  DomainParticipant* participant = DomainParticipantFactory::get_instance()->create_participant(
-      static_cast<std::uint32_t>(*domain_result), qos, options.watch ? &options.watch->listener() : nullptr,
-      eprosima::fastdds::dds::StatusMask::none());
-  if (!participant) {
+  Joined joined = join(*domain_result, qos, options.watch);
+  if (!joined.participant) {
     return Error{Code::kUnavailable,
                  fmt::format("DDS domain {}: no participant could be created; check the network "
                              "interfaces, /dev/shm and the profiles in '{}'", *domain_result, profiles_file().path.string())};
   }
-  auto core = std::make_shared<Core>(participant, *domain_result, *space_result);
-  core->watch = options.watch;
-  return Participant(std::move(core));
+  return Participant(std::make_shared<Core>(std::move(joined), *domain_result, *space_result));
 }
 
 int Participant::domain() const { return core_->domain; }
@@ -256,12 +252,13 @@ std::vector<std::string> profiles_for(const Participant::Core& core, const std::
 
 std::uint64_t Participant::id() const { return participant_id(core_->participant->guid()); }
 
-Participant::Core::Core(DomainParticipant* owned, int domain_id, std::string name_space)
-    : participant(owned),
-      publisher(owned->create_publisher(eprosima::fastdds::dds::PUBLISHER_QOS_DEFAULT)),
-      subscriber(owned->create_subscriber(eprosima::fastdds::dds::SUBSCRIBER_QOS_DEFAULT)),
+Participant::Core::Core(Joined joined, int domain_id, std::string name_space)
+    : participant(joined.participant),
+      publisher(participant->create_publisher(eprosima::fastdds::dds::PUBLISHER_QOS_DEFAULT)),
+      subscriber(participant->create_subscriber(eprosima::fastdds::dds::SUBSCRIBER_QOS_DEFAULT)),
       domain(domain_id),
-      space(std::move(name_space)) {}
+      space(std::move(name_space)),
+      listener_(std::move(joined.listener)) {}
 
 Participant::Core::~Core() {
   participant->delete_contained_entities();

@@ -32,6 +32,7 @@
 #include <string>
 #include <vector>
 
+#include "services/dds/joining.hpp"
 #include "services/dds/security.hpp"
 
 namespace {
@@ -147,8 +148,8 @@ int run(const Arguments& arguments) {
     }
   }
   if (!arguments.raw.empty()) protect_unchecked(qos, arguments);
-  auto* participant = DomainParticipantFactory::get_instance()->create_participant(
-      static_cast<std::uint32_t>(arguments.domain), qos);
+  const dds::Joined joined = dds::join(arguments.domain, qos, {});
+  DomainParticipant* participant = joined.participant;
   if (!participant) {
     std::printf("refused participant\n");
     return 1;

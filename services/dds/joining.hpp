@@ -21,7 +21,7 @@ struct Joined {
 ///
 /// Of participants that come at the same moment, Fast DDS 2.9.1 now and then loses a pair: one
 /// side drops the other's first announcement while it sets itself up, takes later ones for known,
-/// and never answers the other's requests, which come each second (2 of 74 groups of four on two
+/// and never answers the other's requests, which come each second (4 of 202 groups of four on two
 /// cores had such a pair). Only somebody new is answered: who still waits after kPatience joins
 /// again, once. A stranger who never answers costs every start as much, and gets nothing.
 Joined join(int domain, const eprosima::fastdds::dds::DomainParticipantQos& qos, const std::shared_ptr<EndpointWatch>& watch);

@@ -71,8 +71,7 @@ Result<Trajectory> trajectory_from_wire(const msg::TaskResult& wire) {
   const std::size_t nq = wire.nq(), nv = wire.nv(), size = wire.trajectory().size();
   if (size == 0) return Trajectory{};
   if (nq + nv == 0 || size % (nq + nv) != 0) {
-    return wrong("trajectory", fmt::format("{} values", size),
-                 fmt::format("a multiple of nq + nv = {}", nq + nv));
+    return wrong("trajectory", fmt::format("{} values", size), fmt::format("a multiple of nq + nv = {}", nq + nv));
   }
   Trajectory trajectory;
   for (auto at = wire.trajectory().begin(); at != wire.trajectory().end();) {

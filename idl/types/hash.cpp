@@ -13,14 +13,10 @@ Hash hash_bytes(const void* bytes, std::size_t size) {
 
 }  // namespace
 
-std::string to_string(const Hash& hash) {
-  return fmt::format("{:016x}{:016x}", hash.high, hash.low);
-}
+std::string to_string(const Hash& hash) { return fmt::format("{:016x}{:016x}", hash.high, hash.low); }
 
 Hash hash_of(std::string_view bytes) { return hash_bytes(bytes.data(), bytes.size()); }
 
-Hash hash_of(std::span<const double> values) {
-  return hash_bytes(values.data(), values.size_bytes());
-}
+Hash hash_of(std::span<const double> values) { return hash_bytes(values.data(), values.size_bytes()); }
 
 }  // namespace jostle

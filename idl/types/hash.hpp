@@ -33,7 +33,5 @@ Hash hash_of(std::span<const double> values);
 
 template <>
 struct std::hash<jostle::Hash> {
-  std::size_t operator()(const jostle::Hash& value) const noexcept {
-    return static_cast<std::size_t>(value.low);
-  }
+  std::size_t operator()(const jostle::Hash& value) const noexcept { return static_cast<std::size_t>(value.low); }
 };

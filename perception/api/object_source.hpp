@@ -13,10 +13,10 @@ namespace jostle::perception {
 /// Pose X_WB and velocity of one object.
 struct ObjectReading {
   std::string name;
-  std::array<double, 3> position{};              ///< p_WoBo_W, m
-  std::array<double, 4> orientation{1, 0, 0, 0}; ///< unit quaternion w, x, y, z
-  std::array<double, 3> linear{};                ///< m/s, world frame
-  std::array<double, 3> angular{};               ///< rad/s, body frame
+  std::array<double, 3> position{};               ///< p_WoBo_W, m
+  std::array<double, 4> orientation{1, 0, 0, 0};  ///< unit quaternion w, x, y, z
+  std::array<double, 3> linear{};                 ///< m/s, world frame
+  std::array<double, 3> angular{};                ///< rad/s, body frame
 };
 
 /// Motion capture, cameras, or a simulated world.

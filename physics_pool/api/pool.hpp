@@ -59,8 +59,7 @@ class Pool {
   /// Makes a scene's world known; cheap when it already is.
   virtual Result<Hash> load(const Scene& scene) = 0;
 
-  virtual Result<BatchReply> run(const RolloutBatch& batch, TimePoint deadline,
-                                 std::stop_token stop = {}) = 0;
+  virtual Result<BatchReply> run(const RolloutBatch& batch, TimePoint deadline, std::stop_token stop = {}) = 0;
 
   virtual PoolStatus status() const = 0;
 };

@@ -22,22 +22,31 @@ Result<void> check_size(const char* field, std::size_t got, std::size_t wanted) 
 Result<void> check_finite(const char* field, const std::vector<double>& values) {
   const auto bad = std::ranges::find_if_not(values, [](double value) { return std::isfinite(value); });
   if (bad == values.end()) return {};
-  return wrong(fmt::format("{}[{}]", field, bad - values.begin()), fmt::format("{}", *bad),
-               "a finite number");
+  return wrong(fmt::format("{}[{}]", field, bad - values.begin()), fmt::format("{}", *bad), "a finite number");
 }
 
 constexpr double kLeastNearest = 1e-3;  // m
 
 Result<void> check_weights(const Objective& o) {
-  const std::pair<const char*, double> weights[] = {
-      {"goal", o.goal}, {"angle", o.angle}, {"acceleration", o.acceleration},
-      {"disturbance", o.disturbance}, {"disturbance_rotation", o.disturbance_rotation},
-      {"edge", o.edge}, {"edge_rate", o.edge_rate}, {"edge_exponent_max", o.edge_exponent_max},
-      {"edge_margin", o.edge_margin}, {"topple", o.topple}, {"topple_angle", o.topple_angle},
-      {"drop", o.drop}, {"drop_height", o.drop_height},
-      {"obstruction", o.obstruction}, {"obstacle_target", o.obstacle_target},
-      {"obstacle_pusher", o.obstacle_pusher}, {"collision", o.collision},
-      {"intrusion", o.intrusion}, {"success_cost", o.success_cost}};
+  const std::pair<const char*, double> weights[] = {{"goal", o.goal},
+                                                    {"angle", o.angle},
+                                                    {"acceleration", o.acceleration},
+                                                    {"disturbance", o.disturbance},
+                                                    {"disturbance_rotation", o.disturbance_rotation},
+                                                    {"edge", o.edge},
+                                                    {"edge_rate", o.edge_rate},
+                                                    {"edge_exponent_max", o.edge_exponent_max},
+                                                    {"edge_margin", o.edge_margin},
+                                                    {"topple", o.topple},
+                                                    {"topple_angle", o.topple_angle},
+                                                    {"drop", o.drop},
+                                                    {"drop_height", o.drop_height},
+                                                    {"obstruction", o.obstruction},
+                                                    {"obstacle_target", o.obstacle_target},
+                                                    {"obstacle_pusher", o.obstacle_pusher},
+                                                    {"collision", o.collision},
+                                                    {"intrusion", o.intrusion},
+                                                    {"success_cost", o.success_cost}};
   for (const auto& [name, value] : weights) {
     if (value >= 0 && std::isfinite(value)) continue;
     return wrong(fmt::format("objective.{}", name), fmt::format("{}", value),
@@ -52,8 +61,7 @@ Result<void> check_weights(const Objective& o) {
 
 }  // namespace
 
-ControlSequence sample_controls(const ControlSequence& nominal, const SamplingLaw& law,
-                                std::uint32_t sample) {
+ControlSequence sample_controls(const ControlSequence& nominal, const SamplingLaw& law, std::uint32_t sample) {
   ControlSequence controls = nominal;
   const std::uint32_t draw = law.draws.empty() ? sample : law.draws[sample];
   const double scale = law.scales[draw % law.scales.size()];
@@ -153,8 +161,7 @@ Result<void> validate(const RolloutBatch& batch) {
                  fmt::format("0 for the world's own, at most {} s", kMaxTimeStep));
   }
   if (batch.law.scales.empty() || batch.law.scales.size() > kMaxScales) {
-    return wrong("law.scales", fmt::format("{} values", batch.law.scales.size()),
-                 fmt::format("1 to {}", kMaxScales));
+    return wrong("law.scales", fmt::format("{} values", batch.law.scales.size()), fmt::format("1 to {}", kMaxScales));
   }
   for (std::size_t i = 0; i < batch.law.scales.size(); ++i) {
     const double scale = batch.law.scales[i];

@@ -70,18 +70,18 @@ enum class Priority : std::uint8_t {
 
 /// K rollouts of n control steps from one state.
 struct RolloutBatch {
-  Hash world;                   ///< of a scene given to Pool::load
-  State x0;                     ///< [nq], [nv]
-  ControlSequence nominal;      ///< [n][nu]
-  std::vector<double> u_before; ///< [nu] control before step 0, for c_a; the thesis's u_{-1} = 0
-  double step_duration = 1.0;   ///< Delta_t, seconds; a multiple of the world's time step
+  Hash world;                    ///< of a scene given to Pool::load
+  State x0;                      ///< [nq], [nv]
+  ControlSequence nominal;       ///< [n][nu]
+  std::vector<double> u_before;  ///< [nu] control before step 0, for c_a; the thesis's u_{-1} = 0
+  double step_duration = 1.0;    ///< Delta_t, seconds; a multiple of the world's time step
   SamplingLaw law;
   std::uint32_t first_sample = 0;
   std::uint32_t samples = 1;  ///< K >= 1
   Objective objective;
   /// Cost to beat: a rollout that can no longer get below it, nor succeed, stops.
   double incumbent = kInfinity;
-  bool stop_losers = true;       ///< off: every rollout runs to its end
+  bool stop_losers = true;  ///< off: every rollout runs to its end
   /// Judge losers by what is still to come as well (`objective/bound.hpp`).
   bool stop_hopeless = false;
   bool stop_on_success = false;  ///< Alg. 1, lines 8-9
@@ -125,8 +125,7 @@ struct BatchReply {
 };
 
 /// Controls of one sample, bit for bit what the workers ran.
-ControlSequence sample_controls(const ControlSequence& nominal, const SamplingLaw& law,
-                                std::uint32_t sample);
+ControlSequence sample_controls(const ControlSequence& nominal, const SamplingLaw& law, std::uint32_t sample);
 
 /// Chooses BatchReply::winner.
 int select_winner(const std::vector<RolloutOutcome>& outcomes, double incumbent);
@@ -140,9 +139,9 @@ Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, doub
 /// Limits that no sane batch reaches; what is beyond them is refused, not tried.
 inline constexpr std::uint32_t kMaxSamples = 1'000'000;
 inline constexpr int kMaxSteps = 10'000;
-inline constexpr double kMaxStepDuration = 60.0;         // seconds
-inline constexpr double kMaxTimeStep = 0.02;             // seconds; beyond it nothing is stable
-inline constexpr std::size_t kMaxStateSize = 100'000;    // numbers in q or v
+inline constexpr double kMaxStepDuration = 60.0;       // seconds
+inline constexpr double kMaxTimeStep = 0.02;           // seconds; beyond it nothing is stable
+inline constexpr std::size_t kMaxStateSize = 100'000;  // numbers in q or v
 inline constexpr std::size_t kMaxScales = 1'000;
 inline constexpr std::chrono::seconds kMaxWait{10};
 

@@ -27,8 +27,7 @@ Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, 
   if (name == "planar") model = std::make_unique<QuasiStaticModel>(scene, QuasiStaticOptions{});
   if (model) return model;
   return Error{Code::kInvalidArgument,
-               fmt::format("coarse model: got '{}', wanted kinematic, limit-surface, planar or learned:FILE",
-                           name)};
+               fmt::format("coarse model: got '{}', wanted kinematic, limit-surface, planar or learned:FILE", name)};
 }
 
 void to_planar(const StateLayout& layout, const State& x, std::span<double> planar) {

@@ -23,8 +23,8 @@ struct PlanarLayout {
   int sliders = 0;
 
   int size() const { return 2 * half(); }
-  int half() const { return 2 + 3 * sliders; }            ///< poses, or velocities
-  int pose(int slider) const { return 2 + 3 * slider; }   ///< first of x, y, theta
+  int half() const { return 2 + 3 * sliders; }           ///< poses, or velocities
+  int pose(int slider) const { return 2 + 3 * slider; }  ///< first of x, y, theta
   int velocity(int slider) const { return half() + pose(slider); }
   int pusher_velocity() const { return half(); }
 };

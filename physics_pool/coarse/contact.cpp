@@ -27,7 +27,7 @@ Contacts disc_contact(double radius, const Vector2d& centre, const Outline& othe
 // The axis along which two boxes overlap least, seen from the box it belongs to.
 struct Separation {
   double depth = std::numeric_limits<double>::infinity();
-  Vector2d normal;            // outward from the reference box, towards the other
+  Vector2d normal;  // outward from the reference box, towards the other
   bool reference_is_a = true;
 };
 
@@ -36,7 +36,8 @@ void consider(const Outline& reference, const PlanarPose& at, const Outline& oth
   const Vector2d offset = other_at.place - at.place;
   for (const Vector2d& axis : {at.rotate(1, 0), at.rotate(0, 1)}) {
     const auto extent = [&axis](const Outline& shape, const PlanarPose& pose) {
-      return shape.half_x * std::abs(axis.dot(pose.rotate(1, 0))) + shape.half_y * std::abs(axis.dot(pose.rotate(0, 1)));
+      return shape.half_x * std::abs(axis.dot(pose.rotate(1, 0))) +
+             shape.half_y * std::abs(axis.dot(pose.rotate(0, 1)));
     };
     const double depth = extent(reference, at) + extent(other, other_at) - std::abs(axis.dot(offset));
     if (!(depth < least.depth)) continue;
@@ -57,7 +58,8 @@ Contacts box_contacts(const Outline& a, const PlanarPose& pose_a, const Outline&
   std::array<std::pair<double, Vector2d>, 4> corners;  // how deep, and where
   double deepest = -std::numeric_limits<double>::infinity();
   for (int i = 0; i < 4; ++i) {
-    const Vector2d corner = at.place + at.rotate(i & 1 ? other.half_x : -other.half_x, i & 2 ? other.half_y : -other.half_y);
+    const Vector2d corner =
+        at.place + at.rotate(i & 1 ? other.half_x : -other.half_x, i & 2 ? other.half_y : -other.half_y);
     corners[static_cast<std::size_t>(i)] = {-least.normal.dot(corner), corner};
     deepest = std::max(deepest, -least.normal.dot(corner));
   }

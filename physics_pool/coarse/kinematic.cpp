@@ -10,8 +10,8 @@ constexpr int kMarch = 64;       // steps along the way; a glancing disc needs m
 
 // Where the pusher is relative to a slider when they touch.
 struct Touch {
-  double travelled = 0.0;          // d_free, m
-  double arm_x = 0.0, arm_y = 0.0; // r_c in the world's axes, m
+  double travelled = 0.0;           // d_free, m
+  double arm_x = 0.0, arm_y = 0.0;  // r_c in the world's axes, m
 };
 
 }  // namespace

@@ -56,10 +56,8 @@ QuasiStaticModel::QuasiStaticModel(const Scene& scene, const QuasiStaticOptions&
     const Outline shape = outline(object);
     const double c = shape.radius > 0 ? shape.radius : std::hypot(shape.half_x, shape.half_y);
     const double mobility = 1 / std::max(object.friction * object.mass * kGravity, 1e-6);
-    sliders_.push_back({.outline = shape,
-                        .friction = object.friction,
-                        .mobility = mobility,
-                        .turning = mobility / (c * c)});
+    sliders_.push_back(
+        {.outline = shape, .friction = object.friction, .mobility = mobility, .turning = mobility / (c * c)});
   }
   poses_.resize(sliders_.size());
   before_.resize(sliders_.size());
@@ -80,9 +78,9 @@ void QuasiStaticModel::advance_one(double* x, const double* u, double duration) 
   const Vector2d start(x[0], x[1]), way(u[0] * duration, u[1] * duration);
   const double wanted = std::ceil(way.norm() / options_.step);
   // False for NaN, which then runs through a few substeps and comes out as NaN.
-  const int substeps = wanted <= options_.max_substeps
-                           ? std::max(static_cast<int>(wanted), options_.min_substeps)
-                           : std::isfinite(wanted) ? options_.max_substeps : options_.min_substeps;
+  const int substeps = wanted <= options_.max_substeps ? std::max(static_cast<int>(wanted), options_.min_substeps)
+                       : std::isfinite(wanted)         ? options_.max_substeps
+                                                       : options_.min_substeps;
   const Vector2d moved = way / substeps;
   for (int step = 1; step <= substeps; ++step) {
     before_ = poses_;
@@ -163,8 +161,8 @@ void QuasiStaticModel::part(std::size_t i, std::size_t j, const Contact& contact
     response.add(sliders_[k].mobility, sliders_[k].turning, contact.point - poses_[k].place);
   }
   const Vector2d slid = carried(i, contact.point) - carried(j, contact.point);
-  const Vector2d force = response.force(-across(contact.normal).dot(slid),
-                                        std::max(sliders_[i].friction, sliders_[j].friction));
+  const Vector2d force =
+      response.force(-across(contact.normal).dot(slid), std::max(sliders_[i].friction, sliders_[j].friction));
   apply(i, contact.point, force);
   apply(j, contact.point, -force);
 }

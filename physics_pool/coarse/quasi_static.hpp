@@ -15,7 +15,7 @@ struct QuasiStaticOptions {
   double step = 0.001;        ///< m the pusher goes per substep; cost grows as its inverse
   int min_substeps = 8;
   int max_substeps = 128;
-  int sweeps = 4;             ///< over all contacts per substep, where there are several
+  int sweeps = 4;  ///< over all contacts per substep, where there are several
 };
 
 /// Sliders stick to the surface by friction and move only as far as contact makes
@@ -45,9 +45,9 @@ class QuasiStaticModel final : public CoarseModel {
  private:
   struct Slider {
     Outline outline;
-    double friction = 0.0;      // against whatever meets it
-    double mobility = 0.0;      // 1/f_max, 1/N
-    double turning = 0.0;       // 1/(c^2·f_max), 1/(N m^2)
+    double friction = 0.0;  // against whatever meets it
+    double mobility = 0.0;  // 1/f_max, 1/N
+    double turning = 0.0;   // 1/(c^2·f_max), 1/(N m^2)
   };
 
   void advance_one(double* x, const double* u, double duration);

@@ -9,10 +9,10 @@ namespace {
 
 // Below these an object that slides comes to rest within micrometres, and one that
 // leans is not falling. Settling gives less than a millimetre of height.
-constexpr double kStillSpeed = 0.002;     // m/s
-constexpr double kStillRotation = 0.02;   // rad/s
-constexpr double kStandingHeight = 0.001; // m
-constexpr double kStandingLean = 1.5e-4;  // 1 - cos of the tilt: 1 degree
+constexpr double kStillSpeed = 0.002;      // m/s
+constexpr double kStillRotation = 0.02;    // rad/s
+constexpr double kStandingHeight = 0.001;  // m
+constexpr double kStandingLean = 1.5e-4;   // 1 - cos of the tilt: 1 degree
 
 // A velocity drive is stepped explicitly: kv·h/inertia above 1 would overshoot, and
 // above 2 diverge. The fine model has 0.2.
@@ -144,8 +144,7 @@ bool stands_still(const TaskGeometry& geometry, const State& x, std::size_t obje
   const ObjectSlot& slot = geometry.layout.objects[object];
   const double* q = &x.q[static_cast<std::size_t>(slot.q)];
   const double* v = &x.v[static_cast<std::size_t>(slot.v)];
-  return squared_norm(v) < kStillSpeed * kStillSpeed &&
-         squared_norm(v + 3) < kStillRotation * kStillRotation &&
+  return squared_norm(v) < kStillSpeed * kStillSpeed && squared_norm(v + 3) < kStillRotation * kStillRotation &&
          std::abs(q[0]) <= geometry.half_x && std::abs(q[1]) <= geometry.half_y &&
          std::abs(q[2] - geometry.rest_heights[object]) < kStandingHeight &&
          2 * (q[4] * q[4] + q[5] * q[5]) < kStandingLean;

@@ -54,8 +54,8 @@ class ReducedSimulator final : public Dynamics {
   WorldPtr world_;
   Fidelity fidelity_;
   double time_step_;
-  std::vector<bool> free_;                     // by object
-  std::vector<std::unique_ptr<Part>> parts_;   // by number of free objects
+  std::vector<bool> free_;                    // by object
+  std::vector<std::unique_ptr<Part>> parts_;  // by number of free objects
 };
 
 /// Whether an object stands on the surface and moves so little that without its

@@ -24,16 +24,14 @@ RolloutOutcome wait_instead(const RolloutBatch& batch, std::uint32_t sample, Bat
 
 }  // namespace
 
-RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::uint32_t sample,
-                           BatchSignals& signals) {
+RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::uint32_t sample, BatchSignals& signals) {
   if (batch.wait) return wait_instead(batch, sample, signals);
 
   const TaskGeometry& geometry = dynamics.world().geometry();
   const Objective& objective = batch.objective;
   const ControlSequence controls = sample_controls(batch.nominal, batch.law, sample);
   const int steps = controls.steps();
-  const int engine_steps =
-      static_cast<int>(std::lround(batch.step_duration / dynamics.time_step()));
+  const int engine_steps = static_cast<int>(std::lround(batch.step_duration / dynamics.time_step()));
   const auto obsolete = [&signals, sample] { return signals.is_obsolete(sample); };
 
   RolloutOutcome outcome{.sample = sample};

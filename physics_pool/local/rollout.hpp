@@ -49,7 +49,6 @@ class BatchSignals {
 /// with the incumbent. When siblings' news arrive is a matter of timing; who wins is not.
 ///
 /// An obsolete rollout (cancelled, or a lower index succeeded) ends as kSkipped.
-RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::uint32_t sample,
-                           BatchSignals& signals);
+RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::uint32_t sample, BatchSignals& signals);
 
 }  // namespace jostle::physics_pool

@@ -4,8 +4,7 @@
 
 namespace jostle::physics_pool {
 
-Simulator::Simulator(WorldPtr world)
-    : world_(std::move(world)), data_(mj_makeData(world_->model())) {}
+Simulator::Simulator(WorldPtr world) : world_(std::move(world)), data_(mj_makeData(world_->model())) {}
 
 void Simulator::begin(const State& x, std::span<const double> u) {
   std::ranges::copy(x.q, data_->qpos);
@@ -27,7 +26,7 @@ void Simulator::read(State& x) const {
 void Simulator::add_velocity(int dof, double amount) { data_->qvel[dof] += amount; }
 
 Advance Simulator::advance(State& x, std::span<const double> u, int engine_steps,
-                                      const std::function<bool()>& interrupted) {
+                           const std::function<bool()>& interrupted) {
   Advance result;
   try {
     begin(x, u);
@@ -64,9 +63,8 @@ State separate(const World& world, const State& x, double depth, int rounds) {
   for (int round = 0; round < rounds; ++round) {
     mj_forward(model, data.get());
     const mjContact* begin = data->contact;
-    const bool apart = std::none_of(begin, begin + data->ncon, [&](const mjContact& contact) {
-      return contact.dist < -depth;
-    });
+    const bool apart =
+        std::none_of(begin, begin + data->ncon, [&](const mjContact& contact) { return contact.dist < -depth; });
     if (apart) break;
     std::fill_n(data->qvel, model->nv, 0.0);
     mj_step(model, data.get());

@@ -53,8 +53,8 @@ Result<WorldPtr> World::compile(const Scene& scene, Purpose purpose) {
   const StateLayout& layout = world->geometry().layout;
   if (world->model()->nq != layout.nq || world->model()->nv != layout.nv) {
     return Error{Code::kInternal,
-                 fmt::format("scene '{}': compiled to nq {} and nv {}, its layout says {} and {}",
-                             scene.name, world->model()->nq, world->model()->nv, layout.nq, layout.nv)};
+                 fmt::format("scene '{}': compiled to nq {} and nv {}, its layout says {} and {}", scene.name,
+                             world->model()->nq, world->model()->nv, layout.nq, layout.nv)};
   }
   return world;
 }

@@ -45,7 +45,7 @@ class World {
   Hash hash_;
   TaskGeometry geometry_;
   ModelPtr model_;
-  mutable std::mutex mutex_;  // guards reduced_
+  mutable std::mutex mutex_;               // guards reduced_
   mutable std::vector<ModelPtr> reduced_;  // by number of free objects; empty until asked for
 };
 

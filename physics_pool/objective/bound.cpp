@@ -30,8 +30,8 @@ Speeds larger(const Speeds& a, const Speeds& b) {
 
 }  // namespace
 
-Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls,
-                int done, std::span<const double> u_before, const State& x, double step_duration) {
+Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls, int done,
+                std::span<const double> u_before, const State& x, double step_duration) {
   Outlook outlook;
   const bool grasps = !geometry.task.is_push();
   const double distance = grasps ? target_bearing(geometry, x).distance : 0.0;

@@ -12,7 +12,7 @@ namespace jostle::physics_pool {
 
 /// Of a rollout before control step `done`, whose controls are known.
 struct Outlook {
-  double cost = 0.0;      ///< at least this is still to come: running costs and goal
+  double cost = 0.0;        ///< at least this is still to come: running costs and goal
   bool may_succeed = true;  ///< the goal can still be reached
 };
 
@@ -32,7 +32,7 @@ struct Outlook {
 /// any speed.
 ///
 /// `u_before`: control before step `done`.
-Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls,
-                int done, std::span<const double> u_before, const State& x, double step_duration);
+Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls, int done,
+                std::span<const double> u_before, const State& x, double step_duration);
 
 }  // namespace jostle::physics_pool

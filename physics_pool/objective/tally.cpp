@@ -13,8 +13,7 @@ std::optional<End> Tally::count(const State& x) {
   const int t = steps();
   const Objective& objective = batch_.objective;
   const auto u_before = t == 0 ? std::span<const double>(batch_.u_before) : controls_.step(t - 1);
-  const double running =
-      running_cost(geometry_, objective, u_before, controls_.step(t), outcome_.trajectory.back(), x);
+  const double running = running_cost(geometry_, objective, u_before, controls_.step(t), outcome_.trajectory.back(), x);
   sum_ += running;
   outcome_.step_costs.push_back(running);
   outcome_.trajectory.push_back(x);

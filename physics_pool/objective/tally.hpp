@@ -26,7 +26,7 @@ class Tally {
   /// Closes the outcome: cost, steps, and the trajectory if it is worth its way.
   void close(End end);
 
-  double sum() const { return sum_; }                                           ///< so far
+  double sum() const { return sum_; }                                         ///< so far
   int steps() const { return static_cast<int>(outcome_.step_costs.size()); }  ///< counted
 
  private:

@@ -100,8 +100,8 @@ int count_obstructions(const TaskGeometry& geometry, const State& x) {
   for (std::size_t i = 0; i < geometry.layout.objects.size(); ++i) {
     if (static_cast<int>(i) == geometry.layout.target) continue;
     const InHand p = in_hand(geometry.layout.objects[i], x);
-    const bool between = p.forward >= 0 && p.forward <= planar_gripper::kFingerLength &&
-                         p.left <= x.q[kJointLeft] && p.left >= -x.q[kJointRight];
+    const bool between = p.forward >= 0 && p.forward <= planar_gripper::kFingerLength && p.left <= x.q[kJointLeft] &&
+                         p.left >= -x.q[kJointRight];
     count += between ? 1 : 0;
   }
   return count;
@@ -118,8 +118,7 @@ double acceleration_cost(std::span<const double> u_before, std::span<const doubl
   return sum;
 }
 
-double disturbance_cost(const TaskGeometry& geometry, const State& x0, const State& x1,
-                        double rotation_weight) {
+double disturbance_cost(const TaskGeometry& geometry, const State& x0, const State& x1, double rotation_weight) {
   double sum = 0.0;
   for (int i = 0; i < static_cast<int>(geometry.layout.objects.size()); ++i) {
     if (i == geometry.layout.target) continue;
@@ -130,8 +129,7 @@ double disturbance_cost(const TaskGeometry& geometry, const State& x0, const Sta
   return sum;
 }
 
-double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1,
-                 const Objective& objective) {
+double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1, const Objective& objective) {
   double sum = 0.0;
   for (const ObjectSlot& object : geometry.layout.objects) {
     const double* p = &x1.q[object.q];
@@ -147,9 +145,8 @@ double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1,
 
 int toppled_objects(const TaskGeometry& geometry, const State& x, double angle) {
   const double least = std::cos(angle);
-  return static_cast<int>(std::ranges::count_if(geometry.layout.objects, [&](const ObjectSlot& o) {
-    return upright(&x.q[o.q + 3]) < least;
-  }));
+  return static_cast<int>(std::ranges::count_if(geometry.layout.objects,
+                                                [&](const ObjectSlot& o) { return upright(&x.q[o.q + 3]) < least; }));
 }
 
 double obstacle_cost(const TaskGeometry& geometry, const State& x, const Objective& objective) {
@@ -229,18 +226,14 @@ bool at_goal(const TaskGeometry& geometry, const State& x, const Objective& obje
          p.left >= -std::min(hand::kGraspSide, x.q[kJointRight]);
 }
 
-double running_cost(const TaskGeometry& geometry, const Objective& objective,
-                    std::span<const double> u_before, std::span<const double> u, const State& x0,
-                    const State& x1) {
+double running_cost(const TaskGeometry& geometry, const Objective& objective, std::span<const double> u_before,
+                    std::span<const double> u, const State& x0, const State& x1) {
   return objective.acceleration * acceleration_cost(u_before, u) +
-         objective.disturbance *
-             disturbance_cost(geometry, x0, x1, objective.disturbance_rotation) +
+         objective.disturbance * disturbance_cost(geometry, x0, x1, objective.disturbance_rotation) +
          objective.edge * edge_cost(geometry, x0, x1, objective) +
          objective.topple * toppled_objects(geometry, x1, objective.topple_angle) +
-         objective.drop * count_dropped(geometry, x1, objective.drop_height) +
-         obstacle_cost(geometry, x1, objective) +
-         objective.collision * count_collisions(geometry, x1) +
-         objective.intrusion * count_intruders(geometry, x1);
+         objective.drop * count_dropped(geometry, x1, objective.drop_height) + obstacle_cost(geometry, x1, objective) +
+         objective.collision * count_collisions(geometry, x1) + objective.intrusion * count_intruders(geometry, x1);
 }
 
 }  // namespace jostle::physics_pool

@@ -50,13 +50,11 @@ double final_cost(const TaskGeometry& geometry, const Objective& objective, cons
 double acceleration_cost(std::span<const double> u_before, std::span<const double> u);
 
 /// c_d(x0, x1) = sum over the objects but the target of |dp|^2 + w·|rotation|^2
-double disturbance_cost(const TaskGeometry& geometry, const State& x0, const State& x1,
-                        double rotation_weight);
+double disturbance_cost(const TaskGeometry& geometry, const State& x0, const State& x1, double rotation_weight);
 
 /// c_e(x0, x1) = sum of exp(min(k·d_E, cap)) over all objects outside the safe
 /// zone at x1, where d_E is how far the object moved from x0 to x1.
-double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1,
-                 const Objective& objective);
+double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1, const Objective& objective);
 
 /// Objects whose axis leans more than `angle` from upright, rad.
 int toppled_objects(const TaskGeometry& geometry, const State& x, double angle);
@@ -84,8 +82,7 @@ bool at_goal(const TaskGeometry& geometry, const State& x, const Objective& obje
 
 /// All running terms of one control step, weighted. Where Eq. 6.10 leaves x_N to the
 /// final cost alone, here every step counts.
-double running_cost(const TaskGeometry& geometry, const Objective& objective,
-                    std::span<const double> u_before, std::span<const double> u, const State& x0,
-                    const State& x1);
+double running_cost(const TaskGeometry& geometry, const Objective& objective, std::span<const double> u_before,
+                    std::span<const double> u, const State& x0, const State& x1);
 
 }  // namespace jostle::physics_pool

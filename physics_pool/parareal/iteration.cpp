@@ -73,8 +73,10 @@ void PararealIteration::open_slice(int k, std::size_t n) {
 
 void PararealIteration::take_coarse(Level& here, std::size_t n, std::vector<double> planar, int k) {
   if (!is_finite(planar) && problem_.empty()) {
-    problem_ = fmt::format("coarse model '{}': got a state that is not finite after control step {} of iteration {}, "
-                           "wanted finite numbers", coarse_.name(), n, k);
+    problem_ = fmt::format(
+        "coarse model '{}': got a state that is not finite after control step {} of iteration {}, "
+        "wanted finite numbers",
+        coarse_.name(), n, k);
   }
   here.coarse[n] = std::move(planar);
 }

@@ -37,9 +37,9 @@ class PararealIteration {
  public:
   /// A piece of work: F(start, u_n).
   struct Slice {
-    int id = 0;     ///< for complete()
-    int level = 0;  ///< k
-    int step = 0;   ///< n
+    int id = 0;                    ///< for complete()
+    int level = 0;                 ///< k
+    int step = 0;                  ///< n
     const State* start = nullptr;  ///< valid while the iteration lives
   };
 
@@ -90,8 +90,8 @@ class PararealIteration {
   double duration_;
   PararealStop stop_;
   int steps_;
-  std::vector<Level> levels_;                // [K + 1]
-  std::vector<std::optional<State>> fine_;   // by slice
+  std::vector<Level> levels_;               // [K + 1]
+  std::vector<std::optional<State>> fine_;  // by slice
   std::vector<Slice> ready_;
   std::optional<int> final_level_;
   std::string problem_;

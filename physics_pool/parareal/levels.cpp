@@ -23,7 +23,8 @@ Result<std::vector<Trajectory>> predict_levels(Pool& pool, const RolloutBatch& b
                                                CoarseModel& coarse, TimePoint deadline, std::stop_token stop,
                                                double correction_limit) {
   const int steps = batch.nominal.steps();
-  PararealIteration iteration(update, coarse, batch.x0, batch.nominal, batch.step_duration, {.iterations = steps, .correction_limit = correction_limit});
+  PararealIteration iteration(update, coarse, batch.x0, batch.nominal, batch.step_duration,
+                              {.iterations = steps, .correction_limit = correction_limit});
   std::vector<double> planar(static_cast<std::size_t>(update.planar_layout().size()));
   for (int n = 0; n < steps; ++n) {
     iteration.next_start(planar);

@@ -94,8 +94,7 @@ class PararealPool::Run {
   Run(PararealPool& pool, const Known& known, CoarseModel& coarse, const RolloutBatch& batch, std::uint32_t whole)
       : pool_(pool), known_(known), coarse_(coarse), batch_(batch), whole_(whole) {
     for (std::uint32_t i = whole; i < batch.samples; ++i) {
-      samples_.push_back(
-          std::make_unique<Sample>(known, coarse, batch, batch.first_sample + i, pool.options_.stop));
+      samples_.push_back(std::make_unique<Sample>(known, coarse, batch, batch.first_sample + i, pool.options_.stop));
     }
     reply_.outcomes.resize(batch.samples);
     for (std::uint32_t i = 0; i < batch.samples; ++i) reply_.outcomes[i].sample = batch.first_sample + i;
@@ -211,7 +210,8 @@ class PararealPool::Run {
     if (event.slice == kWhole) {
       whole_missing_ = false;
       std::ranges::move(event.reply->outcomes, reply_.outcomes.begin());
-      if (event.reply->winner >= 0 && reply_.outcomes[static_cast<std::size_t>(event.reply->winner)].end == End::kSucceeded) {
+      if (event.reply->winner >= 0 &&
+          reply_.outcomes[static_cast<std::size_t>(event.reply->winner)].end == End::kSucceeded) {
         skip_above(0);
       }
       return {};

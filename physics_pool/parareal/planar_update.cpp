@@ -89,7 +89,8 @@ void PlanarUpdate::correct(State& x, const Step& now, const Step& before, double
     const double correction = size(now.end, before.end);
     const double allowed = limit * (size(now.start, before.start) + pusher);
     const double share = correction > allowed ? allowed / correction : 1.0;
-    displace(x, slider, share * moved(p), share * moved(p + 1), share * std::remainder(moved(p + 2), 2 * std::numbers::pi));
+    displace(x, slider, share * moved(p), share * moved(p + 1),
+             share * std::remainder(moved(p + 2), 2 * std::numbers::pi));
     double* const v = &x.v[static_cast<std::size_t>(layout_.objects[slider].v)];
     v[0] += share * moved(d);
     v[1] += share * moved(d + 1);

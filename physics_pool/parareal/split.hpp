@@ -8,21 +8,21 @@ namespace jostle::physics_pool {
 
 /// What a batch is made of, and what it runs on.
 struct SplitProblem {
-  int samples = 1;       ///< K
-  int steps = 1;         ///< N slices each
-  int workers = 1;       ///< rollouts at a time
-  int iterations = 1;    ///< of Parareal
-  double coarse = 0.0;   ///< c_c, s per slice
-  double fine = 0.0;     ///< c_f, s per slice
+  int samples = 1;      ///< K
+  int steps = 1;        ///< N slices each
+  int workers = 1;      ///< rollouts at a time
+  int iterations = 1;   ///< of Parareal
+  double coarse = 0.0;  ///< c_c, s per slice
+  double fine = 0.0;    ///< c_f, s per slice
 };
 
 /// The first `whole` samples run as whole rollouts, the others in slices.
 struct Split {
   int whole = 0, sliced = 0;
-  double seconds = 0.0;        ///< expected of this choice
-  double all_whole = 0.0;      ///< expected of rollouts alone
-  double all_sliced = 0.0;     ///< of slices alone
-  double speed_up = 0.0;       ///< of one sliced sample over a serial one, Eq. 6.4
+  double seconds = 0.0;     ///< expected of this choice
+  double all_whole = 0.0;   ///< expected of rollouts alone
+  double all_sliced = 0.0;  ///< of slices alone
+  double speed_up = 0.0;    ///< of one sliced sample over a serial one, Eq. 6.4
 };
 
 /// Of one sample on P workers over serial fine steps:

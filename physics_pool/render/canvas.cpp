@@ -25,8 +25,7 @@ std::mutex& engine_globals() {
 class Canvas::Current {
  public:
   explicit Current(Canvas& canvas)
-      : succeeded_(OSMesaMakeCurrent(canvas.gl_, canvas.rgba_.data(), GL_UNSIGNED_BYTE,
-                                     canvas.width_ * kOversampling,
+      : succeeded_(OSMesaMakeCurrent(canvas.gl_, canvas.rgba_.data(), GL_UNSIGNED_BYTE, canvas.width_ * kOversampling,
                                      canvas.height_ * kOversampling) == GL_TRUE) {
     OSMesaPixelStore(OSMESA_Y_UP, 0);
   }
@@ -41,9 +40,10 @@ class Canvas::Current {
 };
 
 Canvas::Canvas(int width, int height)
-    : width_(width), height_(height),
-      rgba_(static_cast<std::size_t>(4 * kOversampling * kOversampling) *
-            static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+    : width_(width),
+      height_(height),
+      rgba_(static_cast<std::size_t>(4 * kOversampling * kOversampling) * static_cast<std::size_t>(width) *
+            static_cast<std::size_t>(height)) {
   mjr_defaultContext(&context_);
 }
 
@@ -58,8 +58,8 @@ Canvas::~Canvas() {
 
 Result<std::unique_ptr<Canvas>> Canvas::create(int width, int height, const mjModel* model) {
   if (width < 1 || height < 1 || width > kLargest || height > kLargest) {
-    return Error{Code::kInvalidArgument, fmt::format("picture size: got {}x{}, wanted 1x1 to {}x{}",
-                                                     width, height, kLargest, kLargest)};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("picture size: got {}x{}, wanted 1x1 to {}x{}", width, height, kLargest, kLargest)};
   }
   install_engine_handlers();
   std::unique_ptr<Canvas> canvas(new Canvas(width, height));
@@ -68,8 +68,8 @@ Result<std::unique_ptr<Canvas>> Canvas::create(int width, int height, const mjMo
 }
 
 Result<void> Canvas::open(const mjModel* model) {
-  static constexpr int kAttributes[] = {OSMESA_FORMAT,  OSMESA_RGBA,           OSMESA_DEPTH_BITS, 24,
-                                        OSMESA_PROFILE, OSMESA_COMPAT_PROFILE, 0};
+  static constexpr int kAttributes[] = {
+      OSMESA_FORMAT, OSMESA_RGBA, OSMESA_DEPTH_BITS, 24, OSMESA_PROFILE, OSMESA_COMPAT_PROFILE, 0};
   const std::lock_guard lock(engine_globals());
   gl_ = OSMesaCreateContextAttribs(kAttributes, nullptr);
   if (gl_ == nullptr) {
@@ -77,8 +77,8 @@ Result<void> Canvas::open(const mjModel* model) {
   }
   const Current current(*this);
   if (!current.succeeded()) {
-    return Error{Code::kUnavailable, fmt::format("picture: OSMesa refused a surface of {}x{}",
-                                                 width_ * kOversampling, height_ * kOversampling)};
+    return Error{Code::kUnavailable, fmt::format("picture: OSMesa refused a surface of {}x{}", width_ * kOversampling,
+                                                 height_ * kOversampling)};
   }
   try {
     mjr_makeContext(model, &context_, mjFONTSCALE_250);
@@ -107,8 +107,8 @@ Picture Canvas::averaged() const {
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       for (int channel = 0; channel < 3; ++channel) {
-        const std::uint8_t* in = rgba_.data() + static_cast<std::size_t>(kOversampling * y) * stride +
-                                 4 * kOversampling * x + channel;
+        const std::uint8_t* in =
+            rgba_.data() + static_cast<std::size_t>(kOversampling * y) * stride + 4 * kOversampling * x + channel;
         int sum = 0;
         for (int dy = 0; dy < kOversampling; ++dy) {
           for (int dx = 0; dx < kOversampling; ++dx) sum += in[static_cast<std::size_t>(dy) * stride + 4 * dx];
@@ -127,8 +127,6 @@ double Canvas::text_width(const std::string& text) const {
   return static_cast<double>(width) / kOversampling;
 }
 
-double Canvas::text_height() const {
-  return static_cast<double>(context_.charHeight) / kOversampling;
-}
+double Canvas::text_height() const { return static_cast<double>(context_.charHeight) / kOversampling; }
 
 }  // namespace jostle::physics_pool

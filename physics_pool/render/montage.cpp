@@ -19,14 +19,14 @@ Result<void> check(std::span<const Picture> pictures, std::span<const std::strin
   if (pictures.empty()) return invalid("pictures: got none, wanted at least one");
   if (columns < 1) return invalid(fmt::format("columns: got {}, wanted at least 1", columns));
   if (captions.size() != pictures.size()) {
-    return invalid(fmt::format("captions: got {}, wanted one for each of {} pictures", captions.size(),
-                               pictures.size()));
+    return invalid(
+        fmt::format("captions: got {}, wanted one for each of {} pictures", captions.size(), pictures.size()));
   }
   const Picture& first = pictures.front();
   for (std::size_t i = 1; i < pictures.size(); ++i) {
     if (pictures[i].width == first.width && pictures[i].height == first.height) continue;
-    return invalid(fmt::format("pictures[{}]: got {}x{} pixels, wanted {}x{} like the first", i,
-                               pictures[i].width, pictures[i].height, first.width, first.height));
+    return invalid(fmt::format("pictures[{}]: got {}x{} pixels, wanted {}x{} like the first", i, pictures[i].width,
+                               pictures[i].height, first.width, first.height));
   }
   return {};
 }
@@ -37,15 +37,14 @@ Result<Picture> caption_strip(Canvas& canvas, const std::string& caption, int wi
     mjr_rectangle(area, 1, 1, 1, 1);
     const double left = std::max(0.0, (1 - canvas.text_width(caption) / width) / 2);
     const double bottom = (1 - canvas.text_height() / kCaptionHeight) / 2;
-    mjr_text(mjFONT_NORMAL, caption.c_str(), &context, static_cast<float>(left),
-             static_cast<float>(bottom), 0.1f, 0.1f, 0.1f);
+    mjr_text(mjFONT_NORMAL, caption.c_str(), &context, static_cast<float>(left), static_cast<float>(bottom), 0.1f, 0.1f,
+             0.1f);
   });
 }
 
 }  // namespace
 
-Result<Picture> montage(std::span<const Picture> pictures, std::span<const std::string> captions,
-                        int columns) {
+Result<Picture> montage(std::span<const Picture> pictures, std::span<const std::string> captions, int columns) {
   if (auto ok = check(pictures, captions, columns); !ok) return ok.error();
   const int count = static_cast<int>(pictures.size());
   const int across = std::min(columns, count), down = (count + across - 1) / across;

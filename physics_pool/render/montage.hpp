@@ -15,7 +15,6 @@ namespace jostle::physics_pool {
 /// Errors   kInvalidArgument  no picture, unequal sizes, other than one caption
 ///                            per picture, or columns < 1
 ///          kUnavailable      there is no software OpenGL to draw letters with
-Result<Picture> montage(std::span<const Picture> pictures, std::span<const std::string> captions,
-                        int columns);
+Result<Picture> montage(std::span<const Picture> pictures, std::span<const std::string> captions, int columns);
 
 }  // namespace jostle::physics_pool

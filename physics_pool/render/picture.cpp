@@ -38,12 +38,11 @@ void paste(Picture& whole, const Picture& part, int x, int y) {
 }
 
 Result<void> write_png(const std::filesystem::path& file, const Picture& picture) {
-  const unsigned problem =
-      lodepng::encode(file.string(), picture.rgb, static_cast<unsigned>(picture.width),
-                      static_cast<unsigned>(picture.height), LCT_RGB);
+  const unsigned problem = lodepng::encode(file.string(), picture.rgb, static_cast<unsigned>(picture.width),
+                                           static_cast<unsigned>(picture.height), LCT_RGB);
   if (problem == 0) return {};
-  return Error{Code::kIo, fmt::format("{}: picture of {}x{} not written: {}", file.string(),
-                                      picture.width, picture.height, lodepng_error_text(problem))};
+  return Error{Code::kIo, fmt::format("{}: picture of {}x{} not written: {}", file.string(), picture.width,
+                                      picture.height, lodepng_error_text(problem))};
 }
 
 }  // namespace jostle::physics_pool

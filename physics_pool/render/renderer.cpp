@@ -54,7 +54,10 @@ Result<void> check(const State& state, int nq) {
 
 struct Renderer::Parts {
   Parts(WorldPtr w, std::unique_ptr<Canvas> c, const mjvCamera& view)
-      : world(std::move(w)), canvas(std::move(c)), camera(view), data(mj_makeData(world->model())),
+      : world(std::move(w)),
+        canvas(std::move(c)),
+        camera(view),
+        data(mj_makeData(world->model())),
         draw_list(world->model()) {
     mjv_defaultOption(&visible);
   }
@@ -81,8 +84,8 @@ Result<Renderer> Renderer::create(const Scene& scene, const RenderOptions& optio
   if (!camera_result) return camera_result.error();
   auto canvas_result = Canvas::create(options.width, options.height, model);
   if (!canvas_result) return canvas_result.error();
-  return Renderer(std::make_unique<Parts>(std::move(world_result).value(),
-                                          std::move(canvas_result).value(), *camera_result));
+  return Renderer(
+      std::make_unique<Parts>(std::move(world_result).value(), std::move(canvas_result).value(), *camera_result));
 }
 
 Result<Picture> Renderer::render(const State& state) {

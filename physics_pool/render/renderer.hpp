@@ -13,8 +13,8 @@
 namespace jostle::physics_pool {
 
 struct RenderOptions {
-  int width = 640, height = 480;     ///< pixels, 1 to 4096; time grows with their product
-  std::string camera = "overview";   ///< "overview" or "top"
+  int width = 640, height = 480;    ///< pixels, 1 to 4096; time grows with their product
+  std::string camera = "overview";  ///< "overview" or "top"
 };
 
 /// Draws one scene many times; the costly part is its construction.

@@ -32,8 +32,7 @@ double scale_of(Uncertainty level) { return static_cast<int>(level); }  // 0, 1,
 
 void draw_body(CounterStream& random, SceneObject& object) {
   if (object.shape == Shape::kBox) {
-    object.size = {random.uniform(0.03, 0.05), random.uniform(0.03, 0.05),
-                   random.uniform(0.036, 0.04)};
+    object.size = {random.uniform(0.03, 0.05), random.uniform(0.03, 0.05), random.uniform(0.036, 0.04)};
   } else {
     object.radius = random.uniform(0.035, 0.04);
     object.height = random.uniform(0.04, 0.055);
@@ -44,19 +43,18 @@ void draw_body(CounterStream& random, SceneObject& object) {
 
 bool is_free(const Scene& scene, const SceneObject& object, double gap) {
   return !overlaps_robot(scene, object, gap) &&
-         std::ranges::none_of(scene.objects,
-                              [&](const SceneObject& other) { return overlap(object, other, gap); });
+         std::ranges::none_of(scene.objects, [&](const SceneObject& other) { return overlap(object, other, gap); });
 }
 
 }  // namespace
 
 Result<Scene> generate_chapter3(const GenerateOptions& options) {
   if (options.objects < 0 || options.objects > 40) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("objects: got {}, wanted 0 to 40", options.objects)};
+    return Error{Code::kInvalidArgument, fmt::format("objects: got {}, wanted 0 to 40", options.objects)};
   }
-  const double side = options.table != 0 ? options.table
-                                         : kTable * std::sqrt(std::max(options.objects, kThesisObjects) / double{kThesisObjects});
+  const double side = options.table != 0
+                          ? options.table
+                          : kTable * std::sqrt(std::max(options.objects, kThesisObjects) / double{kThesisObjects});
   if (!(side >= kTable && side <= kLargestTable)) {
     return Error{Code::kInvalidArgument,
                  fmt::format("table: got {} m, wanted {} to {} m", side, kTable, kLargestTable)};
@@ -78,8 +76,7 @@ Result<Scene> generate_chapter3(const GenerateOptions& options) {
   const double reach_x = scene.surface.size[0] / 2 - options.edge_distance;
   const double reach_y = scene.surface.size[1] / 2 - options.edge_distance;
   for (int i = 0; i < options.objects; ++i) {
-    SceneObject object{.name = fmt::format("object{}", i + 1),
-                       .shape = random.coin() ? Shape::kBox : Shape::kCylinder};
+    SceneObject object{.name = fmt::format("object{}", i + 1), .shape = random.coin() ? Shape::kBox : Shape::kCylinder};
     draw_body(random, object);
     int tries = 0;
     do {
@@ -100,11 +97,10 @@ Result<Scene> generate_chapter3(const GenerateOptions& options) {
 
 namespace {
 
-constexpr std::array<std::pair<const char*, Uncertainty>, 4> kLevels{
-    {{"none", Uncertainty::kNone},
-     {"low", Uncertainty::kLow},
-     {"medium", Uncertainty::kMedium},
-     {"high", Uncertainty::kHigh}}};
+constexpr std::array<std::pair<const char*, Uncertainty>, 4> kLevels{{{"none", Uncertainty::kNone},
+                                                                      {"low", Uncertainty::kLow},
+                                                                      {"medium", Uncertainty::kMedium},
+                                                                      {"high", Uncertainty::kHigh}}};
 
 }  // namespace
 
@@ -112,8 +108,7 @@ Result<Uncertainty> parse_uncertainty(std::string_view word) {
   for (const auto& [name, level] : kLevels) {
     if (word == name) return level;
   }
-  return Error{Code::kInvalidArgument,
-               fmt::format("uncertainty: got '{}', wanted none, low, medium or high", word)};
+  return Error{Code::kInvalidArgument, fmt::format("uncertainty: got '{}', wanted none, low, medium or high", word)};
 }
 
 const char* to_string(Uncertainty level) { return kLevels[static_cast<std::size_t>(level)].first; }
@@ -165,8 +160,7 @@ Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed) {
   return execution;
 }
 
-State observed_state(const Scene& execution, const Scene& belief, const State& truth,
-                     Measurement measurement) {
+State observed_state(const Scene& execution, const Scene& belief, const State& truth, Measurement measurement) {
   State seen = truth;
   const StateLayout layout = layout_of(execution);
   const State start = initial_state(belief);
@@ -175,8 +169,7 @@ State observed_state(const Scene& execution, const Scene& belief, const State& t
     if (measurement == Measurement::kInitial) {
       std::copy_n(start.q.begin() + q, 7, seen.q.begin() + q);
     } else {
-      seen.q[static_cast<std::size_t>(q) + 2] +=
-          belief.objects[i].rest_height() - execution.objects[i].rest_height();
+      seen.q[static_cast<std::size_t>(q) + 2] += belief.objects[i].rest_height() - execution.objects[i].rest_height();
     }
   }
   return seen;

@@ -12,7 +12,7 @@
 namespace jostle::physics_pool {
 
 struct GenerateOptions {
-  int objects = 15;        ///< movable objects beside the target, 0 to 40
+  int objects = 15;  ///< movable objects beside the target, 0 to 40
   std::uint64_t seed = 1;
   /// m; side of the square table, 0 for the thesis's 0.6 m, and for more than 15
   /// objects as much more as keeps the clutter as dense.
@@ -58,7 +58,6 @@ enum class Measurement {
 /// pose noise when a planning world is made and then observes; its experiments
 /// with noisy tracking are separate ones (Sec. 3.3.3). Every object is as high
 /// above the surface as its believed shape puts it; joints are exact.
-State observed_state(const Scene& execution, const Scene& belief, const State& truth,
-                     Measurement measurement);
+State observed_state(const Scene& execution, const Scene& belief, const State& truth, Measurement measurement);
 
 }  // namespace jostle::physics_pool

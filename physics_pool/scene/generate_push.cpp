@@ -15,16 +15,16 @@ constexpr std::uint32_t kPushStream = 0x9054;
 constexpr int kLayoutTries = 1000, kPlaceTries = 100;
 
 // scenes/README.md says why.
-constexpr double kTableX = 1.0, kTableY = 0.8;               // m
-constexpr double kTargetX = -0.25, kGoalX = 0.25;            // m, middles
-constexpr double kSpreadX = 0.03, kSpreadY = 0.1;            // m, either side of them
-constexpr double kGoalRadius = 0.04, kObstacleRadius = 0.04; // m
-constexpr double kObstacleOff = 0.02;                        // m off the straight way, at most
-constexpr double kBoxTurn = 0.3;                             // rad off the way, at most
+constexpr double kTableX = 1.0, kTableY = 0.8;                 // m
+constexpr double kTargetX = -0.25, kGoalX = 0.25;              // m, middles
+constexpr double kSpreadX = 0.03, kSpreadY = 0.1;              // m, either side of them
+constexpr double kGoalRadius = 0.04, kObstacleRadius = 0.04;   // m
+constexpr double kObstacleOff = 0.02;                          // m off the straight way, at most
+constexpr double kBoxTurn = 0.3;                               // rad off the way, at most
 constexpr double kNearestStart = 0.01, kFarthestStart = 0.02;  // m, pusher to target
-constexpr double kGap = 0.005;                               // m between sliders, and to the pusher
-constexpr double kFirst = 0.15, kLast = 0.8;  // of the way, where other sliders may be
-constexpr double kBeside = 0.16;                             // m beside it, at most
+constexpr double kGap = 0.005;                                 // m between sliders, and to the pusher
+constexpr double kFirst = 0.15, kLast = 0.8;                   // of the way, where other sliders may be
+constexpr double kBeside = 0.16;                               // m beside it, at most
 
 // The way from the target's start to the goal region's centre.
 struct Way {
@@ -94,17 +94,17 @@ Scene begin(const GeneratePushOptions& options, CounterStream& random, Way& way)
 bool add_slider(Scene& scene, const Way& way, Shape shape, CounterStream& random) {
   SceneObject slider = make_slider(fmt::format("slider{}", scene.objects.size()), shape);
   // The target, wherever in the goal region, touches nothing.
-  const Disc kept_free{.x = scene.task.goal.x, .y = scene.task.goal.y,
+  const Disc kept_free{.x = scene.task.goal.x,
+                       .y = scene.task.goal.y,
                        .radius = kGoalRadius + largest_radius(scene.objects.front()) + kGap};
   for (int i = 0; i < kPlaceTries; ++i) {
     const double along = random.uniform(kFirst, kLast) * way.length, left = random.uniform(-kBeside, kBeside);
     slider.x = way.x_at(along, left);
     slider.y = way.y_at(along, left);
     slider.yaw = shape == Shape::kBox ? random.uniform(-1.5, 1.5) : 0.0;
-    const bool is_free = signed_distance(slider, kept_free) >= 0 && !overlaps_robot(scene, slider, kGap) &&
-                         std::ranges::none_of(scene.objects, [&](const SceneObject& other) {
-                           return overlap(slider, other, kGap);
-                         });
+    const bool is_free =
+        signed_distance(slider, kept_free) >= 0 && !overlaps_robot(scene, slider, kGap) &&
+        std::ranges::none_of(scene.objects, [&](const SceneObject& other) { return overlap(slider, other, kGap); });
     if (!is_free) continue;
     scene.objects.push_back(slider);
     return true;
@@ -133,8 +133,7 @@ Result<Scene> generate_chapter6(const GeneratePushOptions& options) {
 Result<Scene> generate_chapter7(const GeneratePushOptions& options) {
   constexpr int kMostObjects = 3;
   if (options.objects < 0 || options.objects > kMostObjects) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("objects: got {}, wanted 0 to {}", options.objects, kMostObjects)};
+    return Error{Code::kInvalidArgument, fmt::format("objects: got {}, wanted 0 to {}", options.objects, kMostObjects)};
   }
   CounterStream random(options.seed, kPushStream);
   for (int i = 0; i < kLayoutTries; ++i) {

@@ -22,7 +22,7 @@ inline Outline outline(const SceneObject& object) {
 /// The point of an outline's border nearest to a point: how far away, and the
 /// outward normal there. Inside, the distance is negative.
 struct Nearest {
-  double distance = 0.0;                // m
+  double distance = 0.0;  // m
   double normal_x = 1.0, normal_y = 0.0;
 };
 
@@ -36,9 +36,8 @@ inline Nearest nearest(const Outline& outline, double x, double y) {
   const double along = std::abs(x) - outline.half_x, across = std::abs(y) - outline.half_y;
   if (along > 0 && across > 0) {  // beyond a corner
     const double range = std::hypot(along, across);
-    return {.distance = range,
-            .normal_x = std::copysign(along / range, x),
-            .normal_y = std::copysign(across / range, y)};
+    return {
+        .distance = range, .normal_x = std::copysign(along / range, x), .normal_y = std::copysign(across / range, y)};
   }
   if (along > across) return {.distance = along, .normal_x = std::copysign(1.0, x), .normal_y = 0.0};
   return {.distance = across, .normal_x = 0.0, .normal_y = std::copysign(1.0, y)};

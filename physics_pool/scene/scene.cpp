@@ -24,9 +24,7 @@ Footprint footprint(const SceneObject& object) {
   return {.x = object.x, .y = object.y, .yaw = object.yaw, .outline = outline(object)};
 }
 
-Footprint footprint(const Disc& disc) {
-  return {.x = disc.x, .y = disc.y, .outline = {.radius = disc.radius}};
-}
+Footprint footprint(const Disc& disc) { return {.x = disc.x, .y = disc.y, .outline = {.radius = disc.radius}}; }
 
 std::vector<Footprint> footprint(const SceneRobot& robot) {
   namespace hand = planar_gripper;
@@ -48,7 +46,7 @@ std::vector<Footprint> footprint(const SceneRobot& robot) {
 
 double disc_gap(const Footprint& disc, const Footprint& other) {
   const double dx = disc.x - other.x, dy = disc.y - other.y;
-    const double c = std::cos(other.yaw), s = std::sin(other.yaw);
+  const double c = std::cos(other.yaw), s = std::sin(other.yaw);
   return nearest(other.outline, c * dx + s * dy, -s * dx + c * dy).distance - disc.outline.radius;
 }
 
@@ -114,9 +112,10 @@ Result<void> check_word(const Locate& locate, const char* field, const std::stri
 Result<void> check_push(const Scene& scene, const Locate& locate) {
   const double half_x = scene.surface.size[0] / 2, half_y = scene.surface.size[1] / 2;
   const auto check_disc = [&](const std::string& field, const Disc& disc) {
-    return check(locate, {field, field}, {{".x", disc.x, -half_x, half_x, "m, on the surface"},
-                                          {".y", disc.y, -half_y, half_y, "m, on the surface"},
-                                          {".radius", disc.radius, kSmallest, kLargest, "m"}});
+    return check(locate, {field, field},
+                 {{".x", disc.x, -half_x, half_x, "m, on the surface"},
+                  {".y", disc.y, -half_y, half_y, "m, on the surface"},
+                  {".radius", disc.radius, kSmallest, kLargest, "m"}});
   };
   if (auto ok = check_disc("task.goal", scene.task.goal); !ok) return ok;
   if (!scene.task.obstacle) return {};
@@ -125,9 +124,7 @@ Result<void> check_push(const Scene& scene, const Locate& locate) {
 
 }  // namespace
 
-double SceneObject::rest_height() const {
-  return (shape == Shape::kBox ? size[2] : height) / 2;
-}
+double SceneObject::rest_height() const { return (shape == Shape::kBox ? size[2] : height) / 2; }
 
 int Scene::target() const {
   const auto found = std::ranges::find(objects, task.target, &SceneObject::name);
@@ -144,9 +141,8 @@ bool overlap(const SceneObject& a, const SceneObject& b, double gap) {
 
 bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap) {
   const Footprint body = footprint(object);
-  return std::ranges::any_of(footprint(scene.robot), [&](const Footprint& part) {
-    return footprint_gap(part, body) < gap;
-  });
+  return std::ranges::any_of(footprint(scene.robot),
+                             [&](const Footprint& part) { return footprint_gap(part, body) < gap; });
 }
 
 Result<void> validate(const Scene& scene, const std::string& origin) {
@@ -191,12 +187,13 @@ Result<void> validate(const Scene& scene, const Locate& locate) {
     if (!names.insert(object.name).second) {
       return invalid_at("name", "already taken by another object, wanted a unique name");
     }
-    auto sizes = object.shape == Shape::kBox
-                     ? check(locate, parent, {{"size[0]", object.size[0], kSmallest, kLargest, "m"},
-                                              {"size[1]", object.size[1], kSmallest, kLargest, "m"},
-                                              {"size[2]", object.size[2], kSmallest, kLargest, "m"}})
-                     : check(locate, parent, {{"radius", object.radius, kSmallest, kLargest, "m"},
-                                              {"height", object.height, kSmallest, kLargest, "m"}});
+    auto sizes = object.shape == Shape::kBox ? check(locate, parent,
+                                                     {{"size[0]", object.size[0], kSmallest, kLargest, "m"},
+                                                      {"size[1]", object.size[1], kSmallest, kLargest, "m"},
+                                                      {"size[2]", object.size[2], kSmallest, kLargest, "m"}})
+                                             : check(locate, parent,
+                                                     {{"radius", object.radius, kSmallest, kLargest, "m"},
+                                                      {"height", object.height, kSmallest, kLargest, "m"}});
     if (!sizes) return sizes;
     if (auto ok = check(locate, parent,
                         {{"mass", object.mass, 1e-4, 100, "kg"},
@@ -209,10 +206,9 @@ Result<void> validate(const Scene& scene, const Locate& locate) {
     }
     for (std::size_t j = 0; j < i; ++j) {
       if (!overlap(object, scene.objects[j])) continue;
-      return invalid_at("pose", fmt::format("inside object '{}' by {:.1f} mm, wanted a free place",
-                                            scene.objects[j].name,
-                                            -1e3 * footprint_gap(footprint(object),
-                                                                 footprint(scene.objects[j]))));
+      return invalid_at("pose",
+                        fmt::format("inside object '{}' by {:.1f} mm, wanted a free place", scene.objects[j].name,
+                                    -1e3 * footprint_gap(footprint(object), footprint(scene.objects[j]))));
     }
     if (overlaps_robot(scene, object)) {
       return invalid_at("pose", "inside the robot at its start, wanted a free place; move robot.start or the object");
@@ -250,8 +246,8 @@ State initial_state(const Scene& scene) {
   state.q = {robot.x, robot.y};
   if (!robot.is_pusher()) state.q.insert(state.q.end(), {robot.rotation, robot.opening / 2, robot.opening / 2});
   for (const SceneObject& object : scene.objects) {
-    state.q.insert(state.q.end(), {object.x, object.y, object.rest_height(),
-                                   std::cos(object.yaw / 2), 0, 0, std::sin(object.yaw / 2)});
+    state.q.insert(state.q.end(), {object.x, object.y, object.rest_height(), std::cos(object.yaw / 2), 0, 0,
+                                   std::sin(object.yaw / 2)});
   }
   state.v.assign(static_cast<std::size_t>(layout_of(scene).nv), 0.0);
   return state;

@@ -71,7 +71,7 @@ struct Disc {
 ///          the pusher over the obstacle, nothing else into the region
 struct SceneTask {
   std::string kind = "grasp";
-  std::string target;  ///< name of an object
+  std::string target;            ///< name of an object
   Disc goal{.radius = 0.04};     ///< push only
   std::optional<Disc> obstacle;  ///< push only; a keep-out area, not a body
 
@@ -83,7 +83,7 @@ struct ScenePhysics {
   double time_step = 0.002;  ///< s
   /// "euler" (semi-implicit), or "rk4", four times the work per step, as in Ch. 6.
   std::string integrator = "euler";
-  int iterations = 50;       ///< Newton iterations at most
+  int iterations = 50;  ///< Newton iterations at most
   double tolerance = 1e-8;
 };
 

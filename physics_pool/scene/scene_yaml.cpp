@@ -32,7 +32,7 @@ Scene read(const YAML::Node& root, const std::string& origin) {
   fields.optional("name", scene.name);
   fields.section("surface", false, [&](Fields& surface) {
     surface.choice<Surface::Kind>("kind", scene.surface.kind,
-                   {{"table", Surface::Kind::kTable}, {"shelf", Surface::Kind::kShelf}});
+                                  {{"table", Surface::Kind::kTable}, {"shelf", Surface::Kind::kShelf}});
     surface.numbers("size", scene.surface.size, false);
     surface.optional("wall_height", scene.surface.wall_height);
   });
@@ -107,7 +107,8 @@ Result<Scene> load_scene(const std::filesystem::path& file) {
   std::ostringstream text;
   if (!in || !(text << in.rdbuf())) {
     return Error{Code::kIo, fmt::format("{}: cannot be read, wanted a scene file; `jostle scene "
-                                        "generate` makes one", file.string())};
+                                        "generate` makes one",
+                                        file.string())};
   }
   return parse_scene(text.str(), file.string());
 }
@@ -132,8 +133,8 @@ std::string to_yaml(const Scene& scene) {
     line("  radius: {}", scene.robot.radius);
     line("  height: {}", scene.robot.height);
   } else {
-    line("  start: {{x: {}, y: {}, rotation: {}, opening: {}}}", scene.robot.x, scene.robot.y,
-         scene.robot.rotation, scene.robot.opening);
+    line("  start: {{x: {}, y: {}, rotation: {}, opening: {}}}", scene.robot.x, scene.robot.y, scene.robot.rotation,
+         scene.robot.opening);
   }
   line("objects:");
   for (const SceneObject& object : scene.objects) {

@@ -128,8 +128,7 @@ class Fields {
       const auto key = entry.first.as<std::string>();
       if (!seen.insert(key).second) fail(entry.first, name(key.c_str()), "given twice, wanted once");
       if (!known_.contains(key)) {
-        fail(entry.first, name(key.c_str()),
-             fmt::format("unknown key, wanted one of: {}", fmt::join(known_, ", ")));
+        fail(entry.first, name(key.c_str()), fmt::format("unknown key, wanted one of: {}", fmt::join(known_, ", ")));
       }
     }
   }
@@ -137,9 +136,12 @@ class Fields {
  private:
   template <class T>
   static std::string wanted() {
-    if constexpr (std::is_same_v<T, std::string>) return "text";
-    else if constexpr (std::is_integral_v<T>) return "a whole number";
-    else return "a number";
+    if constexpr (std::is_same_v<T, std::string>)
+      return "text";
+    else if constexpr (std::is_integral_v<T>)
+      return "a whole number";
+    else
+      return "a number";
   }
 
   static std::string describe(const YAML::Node& node) {
@@ -157,8 +159,7 @@ class Fields {
     }
   }
 
-  [[noreturn]] void fail(const YAML::Node& node, const std::string& field,
-                         const std::string& problem) const {
+  [[noreturn]] void fail(const YAML::Node& node, const std::string& field, const std::string& problem) const {
     throw Malformed{fmt::format("{}:{}: {}: {}", origin_, node.Mark().line + 1, field, problem)};
   }
 
@@ -184,8 +185,7 @@ Result<T> parse(std::string_view text, const std::string& origin, Read read) {
   } catch (const Malformed& malformed) {
     return Error{Code::kInvalidArgument, malformed.message};
   } catch (const YAML::Exception& error) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}:{}: not YAML: {}", origin, error.mark.line + 1, error.msg)};
+    return Error{Code::kInvalidArgument, fmt::format("{}:{}: not YAML: {}", origin, error.mark.line + 1, error.msg)};
   }
 }
 

@@ -17,14 +17,14 @@ using physics_pool::TimePoint;
 
 /// What is to be planned.
 struct Problem {
-  Hash world;               ///< planning world, known to the pool
+  Hash world;  ///< planning world, known to the pool
   State x0;
-  ControlSequence initial;  ///< candidate to improve, at least one step
+  ControlSequence initial;       ///< candidate to improve, at least one step
   std::vector<double> u_before;  ///< [nu] control before its first step; empty: at rest
-  int iterations = 50;      ///< I_max
+  int iterations = 50;           ///< I_max
   std::uint64_t seed = 0;
-  std::uint32_t stream = 0; ///< first noise stream; one is used per iteration
-  bool clear_hand = false;  ///< let Objective::obstruction count
+  std::uint32_t stream = 0;                                           ///< first noise stream; one is used per iteration
+  bool clear_hand = false;                                            ///< let Objective::obstruction count
   physics_pool::Priority priority = physics_pool::Priority::kNormal;  ///< of its rollouts; changes no plan
 };
 
@@ -46,7 +46,7 @@ struct Progress {
   int iteration = 0;  ///< 0: the initial candidate was scored
   double cost = 0.0;  ///< of the best sequence so far
   bool at_goal = false;
-  std::uint64_t rollouts = 0;  ///< in this plan so far
+  std::uint64_t rollouts = 0;          ///< in this plan so far
   const State* final_state = nullptr;  ///< of the best sequence; valid during the call
 };
 using OnProgress = std::function<void(const Progress&)>;
@@ -57,8 +57,7 @@ using OnProgress = std::function<void(const Progress&)>;
 class Planner {
  public:
   virtual ~Planner() = default;
-  virtual Result<Plan> plan(const Problem& problem, TimePoint deadline,
-                            std::stop_token stop = {}) = 0;
+  virtual Result<Plan> plan(const Problem& problem, TimePoint deadline, std::stop_token stop = {}) = 0;
 };
 
 }  // namespace jostle::planners

@@ -33,8 +33,7 @@ Step to_pregrasp(const physics_pool::TaskGeometry& geometry, const State& x) {
 // One controller run: Alg. 2 and 3 share everything but when they plan.
 class Run {
  public:
-  Run(const ControlSetup& setup, const ControlOptions& options, const OnEvent& on_event,
-      std::stop_token stop)
+  Run(const ControlSetup& setup, const ControlOptions& options, const OnEvent& on_event, std::stop_token stop)
       : setup_(setup),
         options_(options),
         execution_(setup, options.step_duration, options.timeout, on_event, std::move(stop)),
@@ -50,8 +49,10 @@ class Run {
     if (auto ok = observe(); !ok) return ok;
     if (auto ok = plan(straight(), options_.many_iterations); !ok) return ok;
     for (;;) {
-      if (auto over_result = over(); !over_result) return over_result.error();
-      else if (*over_result) return conclude();
+      if (auto over_result = over(); !over_result)
+        return over_result.error();
+      else if (*over_result)
+        return conclude();
       if (needs_replan()) {
         if (auto ok = replan(); !ok) return ok;
       } else {
@@ -75,8 +76,8 @@ class Run {
   // grow.
   Result<void> replan() {
     const Plan& before = execution_.plan();
-    const int wanted = before.at_goal ? before.controls.steps() + 1
-                                      : std::max(before.controls.steps() + 1, options_.initial_steps);
+    const int wanted =
+        before.at_goal ? before.controls.steps() + 1 : std::max(before.controls.steps() + 1, options_.initial_steps);
     ControlSequence controls = before.controls;
     while (controls.steps() < wanted) controls.append(straight_step(before.states.back()));
     ++execution_.outcome().replans;
@@ -92,8 +93,10 @@ class Run {
   Result<void> naive() {
     if (auto ok = observe(); !ok) return ok;
     for (;;) {
-      if (auto over_result = over(); !over_result) return over_result.error();
-      else if (*over_result) return conclude();
+      if (auto over_result = over(); !over_result)
+        return over_result.error();
+      else if (*over_result)
+        return conclude();
       if (execution_.has_planned()) ++execution_.outcome().replans;
       if (auto ok = plan(straight(), options_.many_iterations); !ok) return ok;
       while (!options_.plan_only && execution_.plan().controls.steps() > 0) {
@@ -119,8 +122,8 @@ class Run {
   }
 
   void feel() {
-    in_hand_ = execution_.robot().object_in_hand.value_or(
-        physics_pool::at_goal(setup_.geometry, x(), setup_.objective));
+    in_hand_ =
+        execution_.robot().object_in_hand.value_or(physics_pool::at_goal(setup_.geometry, x(), setup_.objective));
   }
 
   // Whether the task has ended; closes the hand on the target to be sure, and
@@ -147,8 +150,8 @@ class Run {
       outcome.reason = "target grasped";
     } else {
       outcome.success = execution_.plan().at_goal;
-      outcome.reason = outcome.success ? "plan reaches the target; not executed"
-                                       : "plan does not reach the target; not executed";
+      outcome.reason =
+          outcome.success ? "plan reaches the target; not executed" : "plan does not reach the target; not executed";
     }
     return {};
   }
@@ -219,8 +222,8 @@ class Run {
 
 }  // namespace
 
-Result<Outcome> run_controller(const ControlSetup& setup, const ControlOptions& options,
-                               const OnEvent& on_event, std::stop_token stop) {
+Result<Outcome> run_controller(const ControlSetup& setup, const ControlOptions& options, const OnEvent& on_event,
+                               std::stop_token stop) {
   return Run(setup, options, on_event, std::move(stop)).go();
 }
 

@@ -27,24 +27,24 @@ struct ControlOptions {
   /// After so many re-plans in a row, plans must also clear the hand of what has
   /// lodged in it: predictions that counted on grasping past it have failed.
   int obstruction_patience = 3;
-  int min_steps = 2;         ///< n_min
+  int min_steps = 2;  ///< n_min
   /// SD_thresh: largest |x_predicted - x_observed|, over robot joints (m, rad)
   /// and objects (m, and rad of rotation).
   double deviation_threshold = 0.5;
-  int initial_steps = 6;       ///< n of the straight line
-  double straight_speed = 0.04; ///< m/s of the single straight step
-  double step_duration = 1.0;  ///< Delta_t, s
+  int initial_steps = 6;                              ///< n of the straight line
+  double straight_speed = 0.04;                       ///< m/s of the single straight step
+  double step_duration = 1.0;                         ///< Delta_t, s
   std::chrono::milliseconds timeout{15 * 60 * 1000};  ///< planning and acting together
-  bool plan_only = false;      ///< stop after the first plan
-  bool close_hand = true;      ///< close the fingers on the target at the end
+  bool plan_only = false;                             ///< stop after the first plan
+  bool close_hand = true;                             ///< close the fingers on the target at the end
 };
 
 /// Runs one task to its end. A task that fails (dropped object, timeout) is an
 /// Outcome; an Error means that the parts of the system failed.
 /// Source   Alg. 2 and 3, with the success of Sec. 3.3.2: target in the
 ///          pre-grasp region and no object dropped.
-Result<Outcome> run_controller(const ControlSetup& setup, const ControlOptions& options,
-                               const OnEvent& on_event = {}, std::stop_token stop = {});
+Result<Outcome> run_controller(const ControlSetup& setup, const ControlOptions& options, const OnEvent& on_event = {},
+                               std::stop_token stop = {});
 
 /// U of `steps` equal controls that would bring the hand straight to its
 /// pre-grasp distance from the target if nothing were in the way.

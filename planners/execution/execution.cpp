@@ -45,8 +45,7 @@ Result<void> Execution::plan(const ControlSequence& initial, int iterations, boo
                   .stream = stream_,
                   .clear_hand = clear_hand,
                   // From the first action on a robot stands still for as long as this takes.
-                  .priority = outcome_.actions > 0 ? physics_pool::Priority::kUrgent
-                                                   : physics_pool::Priority::kNormal};
+                  .priority = outcome_.actions > 0 ? physics_pool::Priority::kUrgent : physics_pool::Priority::kNormal};
   auto plan_result = setup_.planner.plan(problem, deadline_, stop_);
   if (!plan_result) return plan_result.error();
   plan_ = std::move(plan_result).value();
@@ -101,9 +100,8 @@ void Execution::notify(Phase phase) const {
 Result<State> assemble_state(const StateLayout& layout, const robot_bridge::RobotReading& robot,
                              const std::vector<perception::ObjectReading>& objects) {
   if (robot.q.size() != layout.joints.size() || robot.v.size() != layout.joints.size()) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("robot: got {} positions and {} velocities, wanted {} joints",
-                             robot.q.size(), robot.v.size(), layout.joints.size())};
+    return Error{Code::kInvalidArgument, fmt::format("robot: got {} positions and {} velocities, wanted {} joints",
+                                                     robot.q.size(), robot.v.size(), layout.joints.size())};
   }
   State x;
   x.q = robot.q;
@@ -112,8 +110,8 @@ Result<State> assemble_state(const StateLayout& layout, const robot_bridge::Robo
     const auto found = std::ranges::find(objects, slot.name, &perception::ObjectReading::name);
     if (found == objects.end()) {
       return Error{Code::kInvalidArgument,
-                   fmt::format("objects: no measurement of '{}', wanted all {} objects of the scene",
-                               slot.name, layout.objects.size())};
+                   fmt::format("objects: no measurement of '{}', wanted all {} objects of the scene", slot.name,
+                               layout.objects.size())};
     }
     x.q.insert(x.q.end(), found->position.begin(), found->position.end());
     x.q.insert(x.q.end(), found->orientation.begin(), found->orientation.end());

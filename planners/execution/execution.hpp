@@ -39,23 +39,23 @@ struct ControlEvent {
   Phase phase = Phase::kPlanning;
   int actions = 0;
   int replans = 0;
-  const Plan* plan = nullptr;      ///< the present plan, once there is one
-  const State* observed = nullptr; ///< newest observation
+  const Plan* plan = nullptr;       ///< the present plan, once there is one
+  const State* observed = nullptr;  ///< newest observation
 };
 using OnEvent = std::function<void(const ControlEvent&)>;
 
 struct Outcome {
   bool success = false;
-  std::string reason;           ///< one sentence
+  std::string reason;  ///< one sentence
   Plan first_plan;
   int replans = 0;
   int actions = 0;
-  std::uint64_t rollouts = 0;   ///< over all plans
-  int iterations = 0;           ///< over all plans
+  std::uint64_t rollouts = 0;                     ///< over all plans
+  int iterations = 0;                             ///< over all plans
   std::chrono::duration<double> plan_time{};      ///< of the first plan
   std::chrono::duration<double> planning_time{};  ///< of all plans
   std::chrono::duration<double> total_time{};
-  Trajectory observed;          ///< before the first action and after each
+  Trajectory observed;  ///< before the first action and after each
   std::vector<std::string> dropped;
 };
 
@@ -66,11 +66,11 @@ struct Outcome {
 /// Time     kDeadline once the run has taken longer than its time.
 class Execution {
  public:
-  Execution(const ControlSetup& setup, double step_duration, std::chrono::milliseconds timeout,
-            const OnEvent& on_event, std::stop_token stop);
+  Execution(const ControlSetup& setup, double step_duration, std::chrono::milliseconds timeout, const OnEvent& on_event,
+            std::stop_token stop);
 
   const StateLayout& layout() const { return setup_.geometry.layout; }
-  const State& x() const { return x_; }                                   ///< newest observation
+  const State& x() const { return x_; }                                 ///< newest observation
   const robot_bridge::RobotReading& robot() const { return reading_; }  ///< of the same moment
   Outcome& outcome() { return outcome_; }
   const Outcome& outcome() const { return outcome_; }

@@ -10,9 +10,9 @@
 namespace jostle::planners {
 namespace {
 
-constexpr double kLost = 0.001;    // m; a plan that moves the target less does not push it
+constexpr double kLost = 0.001;      // m; a plan that moves the target less does not push it
 constexpr double kClearance = 0.01;  // m between target and a pusher that goes round it
-constexpr double kBehind = 0.8;    // rad; further off the line of a push the pusher slips off
+constexpr double kBehind = 0.8;      // rad; further off the line of a push the pusher slips off
 
 struct Point {
   double x = 0.0, y = 0.0;  // m
@@ -118,7 +118,8 @@ Result<Outcome> run_mpc(const ControlSetup& setup, const MpcOptions& options, co
 ControlSequence straight_push(const physics_pool::TaskGeometry& geometry, const State& x, int steps,
                               double step_duration, double speed) {
   const physics_pool::SceneObject& shape = geometry.target;
-  const double radius = shape.shape == physics_pool::Shape::kBox ? std::hypot(shape.size[0], shape.size[1]) / 2 : shape.radius;
+  const double radius =
+      shape.shape == physics_pool::Shape::kBox ? std::hypot(shape.size[0], shape.size[1]) / 2 : shape.radius;
   const double reach = radius + geometry.pusher_radius + kClearance;
   const double stride = speed * step_duration;
   Point target = target_in(geometry, x), pusher{x.q[kJointX], x.q[kJointY]};
@@ -127,7 +128,8 @@ ControlSequence straight_push(const physics_pool::TaskGeometry& geometry, const 
     const double dx = geometry.task.goal.x - target.x, dy = geometry.task.goal.y - target.y;
     const double way = std::hypot(dx, dy), push = std::atan2(dy, dx);
     // Where the pusher is as seen from the target: 0 straight behind it.
-    const double around = std::remainder(std::atan2(target.y - pusher.y, target.x - pusher.x) - push, 2 * std::numbers::pi);
+    const double around =
+        std::remainder(std::atan2(target.y - pusher.y, target.x - pusher.x) - push, 2 * std::numbers::pi);
     Point step;
     if (std::abs(around) <= kBehind) {
       const double length = std::min(stride, way / (steps - t));

@@ -13,14 +13,14 @@
 namespace jostle::planners {
 
 struct MpcOptions {
-  int horizon = 4;             ///< N, actions of a plan (Sec. 6.3.3)
-  int first_iterations = 4;    ///< of the optimizer, for the first plan
-  int iterations = 2;          ///< for every other; more find more and cost more
-  int max_actions = 20;        ///< the task has failed after so many (Sec. 6.3.3)
-  double straight_speed = 0.1; ///< m/s, of the straight push, at most
-  double step_duration = 1.0;  ///< Delta_t, s
+  int horizon = 4;                                    ///< N, actions of a plan (Sec. 6.3.3)
+  int first_iterations = 4;                           ///< of the optimizer, for the first plan
+  int iterations = 2;                                 ///< for every other; more find more and cost more
+  int max_actions = 20;                               ///< the task has failed after so many (Sec. 6.3.3)
+  double straight_speed = 0.1;                        ///< m/s, of the straight push, at most
+  double step_duration = 1.0;                         ///< Delta_t, s
   std::chrono::milliseconds timeout{15 * 60 * 1000};  ///< planning and acting together
-  bool plan_only = false;      ///< stop after the first plan
+  bool plan_only = false;                             ///< stop after the first plan
 };
 
 /// Runs one push task to its end. A task that fails (obstacle hit, object dropped,

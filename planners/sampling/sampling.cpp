@@ -20,8 +20,7 @@ std::size_t rounded_up(double part, std::size_t of) {
 // Where the next samples come from, and how it follows from the last ones.
 class Distribution {
  public:
-  Distribution(const SamplingOptions& options, const ControlSequence& initial)
-      : options_(options), mean_(initial) {
+  Distribution(const SamplingOptions& options, const ControlSequence& initial) : options_(options), mean_(initial) {
     for (int t = 0; t < initial.steps(); ++t) {
       sigma_.insert(sigma_.end(), options.sigma.begin(), options.sigma.end());
     }

@@ -30,7 +30,7 @@ struct SamplingOptions {
   /// opening [m/s]; of kCem and kIcem in the first iteration.
   std::vector<double> sigma{0.04, 0.04, 0.25, 0.004};
   std::vector<double> limit{0.15, 0.15, 0.8, 0.05};  ///< [nu] largest controls, same units
-  double lambda = 100.0;  ///< of kMppi, in units of cost, > 0; small is greedy
+  double lambda = 100.0;                             ///< of kMppi, in units of cost, > 0; small is greedy
   /// Of kCem and kIcem: part of K that the fit is made to, in (0, 1], rounded up;
   /// a larger one converges later, and less often to the wrong place.
   double elites = 0.25;

@@ -102,7 +102,8 @@ Result<Plan> Search::until_done(const std::function<Result<void>()>& improve) {
   if (best_.cost == physics_pool::kInfinity) {
     return Error{Code::kInvalidArgument,
                  fmt::format("x0: all {} rollouts from it diverged ({}), wanted a state that physics "
-                             "can start from", best_.rollouts, divergence_)};
+                             "can start from",
+                             best_.rollouts, divergence_)};
   }
   return std::move(best_);
 }
@@ -143,8 +144,7 @@ std::vector<double> exponential_weights(const std::vector<double>& costs, double
   return weights;
 }
 
-void average_step(std::span<const Scored> samples, std::span<const double> weights, int t,
-                  ControlSequence& mean) {
+void average_step(std::span<const Scored> samples, std::span<const double> weights, int t, ControlSequence& mean) {
   const std::span<double> u = mean.step(t);
   std::ranges::fill(u, 0.0);
   double total = 0.0;

@@ -18,8 +18,8 @@ class Search {
  public:
   /// `pattern`: what all batches have in common, such as the law and the
   /// objective. World, state and seed are the problem's, and a success ends a batch.
-  Search(physics_pool::Pool& pool, const Problem& problem, physics_pool::RolloutBatch pattern,
-         TimePoint deadline, std::stop_token stop, const OnProgress& on_progress);
+  Search(physics_pool::Pool& pool, const Problem& problem, physics_pool::RolloutBatch pattern, TimePoint deadline,
+         std::stop_token stop, const OnProgress& on_progress);
 
   /// Cheapest sequence so far; its controls are the initial ones until there is one.
   const Plan& best() const { return best_; }
@@ -77,7 +77,6 @@ std::vector<Scored> completed(const physics_pool::RolloutBatch& batch, const phy
 std::vector<double> exponential_weights(const std::vector<double>& costs, double lambda);
 
 /// Sets step t of `mean` to the weighted mean of the samples' step t.
-void average_step(std::span<const Scored> samples, std::span<const double> weights, int t,
-                  ControlSequence& mean);
+void average_step(std::span<const Scored> samples, std::span<const double> weights, int t, ControlSequence& mean);
 
 }  // namespace jostle::planners

@@ -37,8 +37,7 @@ class Robot {
 
   /// Applies u (x, y [m/s]; of a gripper also rotation [rad/s], opening [m/s]) for
   /// `duration` seconds and returns when that time is over.
-  virtual Result<void> execute(std::span<const double> u, double duration,
-                               std::stop_token stop = {}) = 0;
+  virtual Result<void> execute(std::span<const double> u, double duration, std::stop_token stop = {}) = 0;
 };
 
 }  // namespace jostle::robot_bridge

@@ -8,17 +8,16 @@ namespace jostle::robot_bridge {
 
 Result<void> check_command(std::span<const double> u, int axes, double duration) {
   if (u.size() != static_cast<std::size_t>(axes)) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("velocities: got {} values, wanted {}", u.size(), axes)};
+    return Error{Code::kInvalidArgument, fmt::format("velocities: got {} values, wanted {}", u.size(), axes)};
   }
   for (std::size_t i = 0; i < u.size(); ++i) {
     if (std::abs(u[i]) <= kFastest) continue;  // false for NaN
-    return Error{Code::kInvalidArgument, fmt::format("velocities[{}]: got {}, wanted -{} to {} m/s or rad/s",
-                                                     i, u[i], kFastest, kFastest)};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("velocities[{}]: got {}, wanted -{} to {} m/s or rad/s", i, u[i], kFastest, kFastest)};
   }
   if (!(duration > 0 && duration <= kLongestAction)) {
-    return Error{Code::kInvalidArgument, fmt::format("duration: got {} s, wanted more than 0, at most {} s",
-                                                     duration, kLongestAction)};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("duration: got {} s, wanted more than 0, at most {} s", duration, kLongestAction)};
   }
   return {};
 }

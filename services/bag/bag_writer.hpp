@@ -23,8 +23,8 @@ struct BagOptions {
     kSqlite,  ///< rosbag2's .db3, for tools that read nothing else
   };
   Storage storage = Storage::kMcap;
-  bool compress = true;           ///< MCAP only: a third of the size, for some processor time
-  std::uint64_t split_bytes = 0;  ///< a new file once one is this large; 0: never
+  bool compress = true;                    ///< MCAP only: a third of the size, for some processor time
+  std::uint64_t split_bytes = 0;           ///< a new file once one is this large; 0: never
   std::chrono::nanoseconds split_time{0};  ///< a new file after so much log time; 0: never
 };
 

@@ -21,19 +21,37 @@ using Json = nlohmann::ordered_json;
 
 enum class Basic { kBool, kU8, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF32, kF64, kString, kMessage };
 
-constexpr std::array<std::pair<std::string_view, Basic>, 14> kBasics{{
-    {"bool", Basic::kBool}, {"byte", Basic::kU8}, {"char", Basic::kU8}, {"uint8", Basic::kU8}, {"int8", Basic::kI8},
-    {"uint16", Basic::kU16}, {"int16", Basic::kI16}, {"uint32", Basic::kU32}, {"int32", Basic::kI32},
-    {"uint64", Basic::kU64}, {"int64", Basic::kI64}, {"float32", Basic::kF32}, {"float64", Basic::kF64},
-    {"string", Basic::kString}}};
+constexpr std::array<std::pair<std::string_view, Basic>, 14> kBasics{{{"bool", Basic::kBool},
+                                                                      {"byte", Basic::kU8},
+                                                                      {"char", Basic::kU8},
+                                                                      {"uint8", Basic::kU8},
+                                                                      {"int8", Basic::kI8},
+                                                                      {"uint16", Basic::kU16},
+                                                                      {"int16", Basic::kI16},
+                                                                      {"uint32", Basic::kU32},
+                                                                      {"int32", Basic::kI32},
+                                                                      {"uint64", Basic::kU64},
+                                                                      {"int64", Basic::kI64},
+                                                                      {"float32", Basic::kF32},
+                                                                      {"float64", Basic::kF64},
+                                                                      {"string", Basic::kString}}};
 
 // Of strings and messages: at least.
 constexpr std::size_t size_of(Basic basic) {
   switch (basic) {
-    case Basic::kU16: case Basic::kI16: return 2;
-    case Basic::kU32: case Basic::kI32: case Basic::kF32: return 4;
-    case Basic::kU64: case Basic::kI64: case Basic::kF64: return 8;
-    default: return 1;
+    case Basic::kU16:
+    case Basic::kI16:
+      return 2;
+    case Basic::kU32:
+    case Basic::kI32:
+    case Basic::kF32:
+      return 4;
+    case Basic::kU64:
+    case Basic::kI64:
+    case Basic::kF64:
+      return 8;
+    default:
+      return 1;
   }
 }
 
@@ -244,19 +262,32 @@ class CdrReader {
   }
   Json value(const Field& field) {
     switch (field.basic) {
-      case Basic::kBool: return number<std::uint8_t>() != 0;
-      case Basic::kU8: return number<std::uint8_t>();
-      case Basic::kI8: return number<std::int8_t>();
-      case Basic::kU16: return number<std::uint16_t>();
-      case Basic::kI16: return number<std::int16_t>();
-      case Basic::kU32: return number<std::uint32_t>();
-      case Basic::kI32: return number<std::int32_t>();
-      case Basic::kU64: return number<std::uint64_t>();
-      case Basic::kI64: return number<std::int64_t>();
-      case Basic::kF32: return number<float>();
-      case Basic::kF64: return number<double>();
-      case Basic::kString: return text();
-      case Basic::kMessage: return message(field.message);
+      case Basic::kBool:
+        return number<std::uint8_t>() != 0;
+      case Basic::kU8:
+        return number<std::uint8_t>();
+      case Basic::kI8:
+        return number<std::int8_t>();
+      case Basic::kU16:
+        return number<std::uint16_t>();
+      case Basic::kI16:
+        return number<std::int16_t>();
+      case Basic::kU32:
+        return number<std::uint32_t>();
+      case Basic::kI32:
+        return number<std::int32_t>();
+      case Basic::kU64:
+        return number<std::uint64_t>();
+      case Basic::kI64:
+        return number<std::int64_t>();
+      case Basic::kF32:
+        return number<float>();
+      case Basic::kF64:
+        return number<double>();
+      case Basic::kString:
+        return text();
+      case Basic::kMessage:
+        return message(field.message);
     }
     return {};
   }

@@ -81,11 +81,20 @@ std::vector<Token> tokens_of(std::string_view text) {
 }
 
 const std::map<std::string, std::string>& basic_types() {
-  static const std::map<std::string, std::string> kTypes{
-      {"boolean", "bool"}, {"octet", "uint8"}, {"char", "char"}, {"uint8", "uint8"}, {"int8", "int8"},
-      {"short", "int16"}, {"unsigned short", "uint16"}, {"long", "int32"}, {"unsigned long", "uint32"},
-      {"long long", "int64"}, {"unsigned long long", "uint64"}, {"float", "float32"}, {"double", "float64"},
-      {"string", "string"}};
+  static const std::map<std::string, std::string> kTypes{{"boolean", "bool"},
+                                                         {"octet", "uint8"},
+                                                         {"char", "char"},
+                                                         {"uint8", "uint8"},
+                                                         {"int8", "int8"},
+                                                         {"short", "int16"},
+                                                         {"unsigned short", "uint16"},
+                                                         {"long", "int32"},
+                                                         {"unsigned long", "uint32"},
+                                                         {"long long", "int64"},
+                                                         {"unsigned long long", "uint64"},
+                                                         {"float", "float32"},
+                                                         {"double", "float64"},
+                                                         {"string", "string"}};
   return kTypes;
 }
 

@@ -167,7 +167,8 @@ void leave_out_strays(Index& index) {
 
 // One message per channel; if damage has not taken it already.
 void leave_out_repeated(Index& index) {
-  const auto chunk = std::ranges::find(index.blocks, index.repeated, [](const Block& block) { return std::optional(block.offset); });
+  const auto chunk =
+      std::ranges::find(index.blocks, index.repeated, [](const Block& block) { return std::optional(block.offset); });
   if (chunk == index.blocks.end()) return;
   for (const auto& [channel, unused] : chunk->channels) {
     if (const auto count = index.counts.find(channel); count != index.counts.end() && count->second > 0) {

@@ -35,7 +35,8 @@ Result<std::uint64_t> copy(bag::CheckedReader& from, bag::BagWriter& to, std::st
     auto message_result = from.next();
     if (!message_result) return message_result.error();
     if (!*message_result) return done;
-    if (auto ok = to.write(topics[static_cast<std::size_t>((*message_result)->topic)], (*message_result)->view()); !ok) {
+    if (auto ok = to.write(topics[static_cast<std::size_t>((*message_result)->topic)], (*message_result)->view());
+        !ok) {
       return ok.error();
     }
     ++done;

@@ -34,15 +34,17 @@ constexpr int kFirstWorkerHost = 2;
 constexpr int kIterations = 4;   // of a plan: a second or two
 constexpr int kUndisturbed = 3;  // plans before the first fault
 constexpr std::chrono::seconds kPlanPatience{120};
-constexpr std::chrono::seconds kHang{20};     // beyond a deadline that should have ended it
-constexpr std::chrono::seconds kReturn{30};   // of all workers, after the last fault
+constexpr std::chrono::seconds kHang{20};    // beyond a deadline that should have ended it
+constexpr std::chrono::seconds kReturn{30};  // of all workers, after the last fault
 constexpr std::chrono::seconds kNewsEvery{5};
 
 // Carries out a schedule, on a thread of its own.
 class Saboteur {
  public:
   Saboteur(std::vector<Fault> schedule, Helpers& helpers, const Hosts* hosts)
-      : schedule_(std::move(schedule)), helpers_(helpers), hosts_(hosts),
+      : schedule_(std::move(schedule)),
+        helpers_(helpers),
+        hosts_(hosts),
         thread_([this](std::stop_token stop) { work(stop); }) {}
 
   bool done() const { return done_; }
@@ -87,9 +89,15 @@ class Saboteur {
 
   void commit(const Fault& fault) {
     switch (fault.kind) {
-      case Fault::Kind::kKill: kill(pid_of(fault), SIGKILL); break;
-      case Fault::Kind::kStall: kill(pid_of(fault), SIGSTOP); break;
-      case Fault::Kind::kUnplug: hosts_->plug(kFirstWorkerHost + fault.target, false); break;
+      case Fault::Kind::kKill:
+        kill(pid_of(fault), SIGKILL);
+        break;
+      case Fault::Kind::kStall:
+        kill(pid_of(fault), SIGSTOP);
+        break;
+      case Fault::Kind::kUnplug:
+        hosts_->plug(kFirstWorkerHost + fault.target, false);
+        break;
     }
   }
 
@@ -98,8 +106,12 @@ class Saboteur {
       case Fault::Kind::kKill:
         if (auto ok = helpers_.replace(static_cast<std::size_t>(fault.target)); !ok) result_ = ok;
         break;
-      case Fault::Kind::kStall: kill(pid_of(fault), SIGCONT); break;
-      case Fault::Kind::kUnplug: hosts_->plug(kFirstWorkerHost + fault.target, true); break;
+      case Fault::Kind::kStall:
+        kill(pid_of(fault), SIGCONT);
+        break;
+      case Fault::Kind::kUnplug:
+        hosts_->plug(kFirstWorkerHost + fault.target, true);
+        break;
     }
   }
 
@@ -159,15 +171,13 @@ class Watchdog {
 struct Report {
   std::vector<Fault> schedule;
   std::vector<double> undisturbed, disturbed;  // seconds of each plan
-  Hash hash;        // of the undisturbed plan
-  int unequal = 0;  // plans
-  double returned = 0.0;  // seconds from the last repair until every worker could be used
-  double seconds = 0.0;   // from the first fault to the last plan's end
+  Hash hash;                                   // of the undisturbed plan
+  int unequal = 0;                             // plans
+  double returned = 0.0;                       // seconds from the last repair until every worker could be used
+  double seconds = 0.0;                        // from the first fault to the last plan's end
   physics_pool::PoolStatus pool;
 
-  int count(Fault::Kind kind) const {
-    return static_cast<int>(std::ranges::count(schedule, kind, &Fault::kind));
-  }
+  int count(Fault::Kind kind) const { return static_cast<int>(std::ranges::count(schedule, kind, &Fault::kind)); }
 };
 
 Error at(const Error& error, const ChaosOptions& options, const std::string& where) {
@@ -180,8 +190,8 @@ class Chaos {
 
   Result<Report> run() {
     report_.schedule = chaos_schedule(options_.seed, options_.faults, options_.workers, hosts_ ? kWorkerHosts : 0);
-    auto swarm_result = Swarm::start({.workers = options_.workers, .domain = options_.domain, .hosts = hosts_,
-                                      .stop = options_.stop});
+    auto swarm_result =
+        Swarm::start({.workers = options_.workers, .domain = options_.domain, .hosts = hosts_, .stop = options_.stop});
     if (!swarm_result) return swarm_result.error();
     Swarm& swarm = **swarm_result;
     auto plan_result = PlanAgain::make(swarm.pool(), kIterations);
@@ -213,7 +223,8 @@ class Chaos {
         if (worker.alive) heard += fmt::format(" {}", worker.name);
       }
       return at({Code::kUnavailable, fmt::format("not all of {} workers could be used again within {} s; heard:{}",
-                                                 options_.workers, kReturn.count(), heard)}, options_, where());
+                                                 options_.workers, kReturn.count(), heard)},
+                options_, where());
     }
     report_.returned = seconds_since(repaired);
     return plan(again, report_.disturbed, [] { return std::string("after all faults"); });
@@ -251,13 +262,14 @@ class Chaos {
 constexpr std::array kKinds{Fault::Kind::kKill, Fault::Kind::kStall, Fault::Kind::kUnplug};
 
 void print(const Report& report, const ChaosOptions& options) {
-  fmt::print("chaos, seed {}: {} faults in {:.0f} s: {} kills, each replaced, {} stalls, {} unplugged hosts\n", options.seed,
-             report.schedule.size(), report.seconds, report.count(Fault::Kind::kKill), report.count(Fault::Kind::kStall),
-             report.count(Fault::Kind::kUnplug));
+  fmt::print("chaos, seed {}: {} faults in {:.0f} s: {} kills, each replaced, {} stalls, {} unplugged hosts\n",
+             options.seed, report.schedule.size(), report.seconds, report.count(Fault::Kind::kKill),
+             report.count(Fault::Kind::kStall), report.count(Fault::Kind::kUnplug));
   fmt::print("  plans          {} meanwhile, median {:.2f} s, longest {:.2f} s; undisturbed {:.2f} s\n",
              report.disturbed.size(), median(report.disturbed), std::ranges::max(report.disturbed),
              median(report.undisturbed));
-  fmt::print("  samples        {} handed out again, {} came twice or late\n", report.pool.reissued, report.pool.duplicates);
+  fmt::print("  samples        {} handed out again, {} came twice or late\n", report.pool.reissued,
+             report.pool.duplicates);
   fmt::print("  workers        all {} usable {:.1f} s after the last repair\n", options.workers, report.returned);
   fmt::print("  all bit-equal  {}  {}\n", report.unequal == 0 ? "yes" : fmt::format("NO: {} differ", report.unequal),
              to_string(report.hash));

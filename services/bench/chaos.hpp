@@ -17,7 +17,7 @@ struct ChaosOptions {
   int faults = 200;        ///< >= 1; three or so a second
   int workers = 4;         ///< processes of one thread, dealt to two hosts
   int domain = 0;
-  std::filesystem::path json;  ///< empty: none
+  std::filesystem::path json;                            ///< empty: none
   std::function<void(const std::string& line)> on_news;  ///< never empty
   std::stop_token stop;
 };

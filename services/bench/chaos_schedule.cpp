@@ -33,9 +33,12 @@ milliseconds duration(Fault::Kind kind, Dice& dice) {
 
 std::string to_string(Fault::Kind kind) {
   switch (kind) {
-    case Fault::Kind::kKill: return "kill";
-    case Fault::Kind::kStall: return "stall";
-    case Fault::Kind::kUnplug: return "unplug";
+    case Fault::Kind::kKill:
+      return "kill";
+    case Fault::Kind::kStall:
+      return "stall";
+    case Fault::Kind::kUnplug:
+      return "unplug";
   }
   return "";
 }

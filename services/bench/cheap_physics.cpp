@@ -103,17 +103,18 @@ Result<std::vector<RolloutOutcome>> samples(Pool& pool, const Task& task, const 
                                             const Fidelity& fidelity, std::stop_token stop) {
   const PbstoOptions& options = study.levers.front().options;
   const planners::Problem problem = task.problem(study.control, 0);
-  RolloutBatch batch{.world = task.hash,
-                     .x0 = problem.x0,
-                     .nominal = problem.initial,
-                     .u_before = std::vector<double>(kGripperAxes, 0.0),
-                     .step_duration = options.step_duration,
-                     .law = {.sigma = options.sigma, .limit = options.limit, .scales = options.scales, .seed = task.seed},
-                     .samples = study.samples,
-                     .objective = options.objective,
-                     .stop_losers = false,
-                     .want_all_trajectories = true,
-                     .fidelity = fidelity};
+  RolloutBatch batch{
+      .world = task.hash,
+      .x0 = problem.x0,
+      .nominal = problem.initial,
+      .u_before = std::vector<double>(kGripperAxes, 0.0),
+      .step_duration = options.step_duration,
+      .law = {.sigma = options.sigma, .limit = options.limit, .scales = options.scales, .seed = task.seed},
+      .samples = study.samples,
+      .objective = options.objective,
+      .stop_losers = false,
+      .want_all_trajectories = true,
+      .fidelity = fidelity};
   auto reply_result = pool.run(batch, steady_clock::now() + kPatience, stop);
   if (!reply_result) return reply_result.error();
   return std::move(reply_result->outcomes);
@@ -270,7 +271,10 @@ class Study {
       result.same_plans += plan.controls == first->plan.controls ? 1 : 0;
       if (plan.at_goal && first->plan.at_goal) result.time_ratios.push_back(first->seconds / timed_result->seconds);
       line += fmt::format("  {} {} {:.1f} s", options_.levers[i].name,
-                          executed ? "grasps" : plan.at_goal ? "misses" : "no plan", timed_result->seconds);
+                          executed       ? "grasps"
+                          : plan.at_goal ? "misses"
+                                         : "no plan",
+                          timed_result->seconds);
     }
     tell("{} objects, world {}:{}", objects, task.seed, line);
     return {};
@@ -362,9 +366,9 @@ Result<CheapPhysics> measure_cheap_physics(Pool& pool, const CheapPhysicsOptions
 }
 
 std::string to_text(const CheapPhysics& results) {
-  std::string text = fmt::format("{:<11}{:>7}  {:<22}{:<8}{:<20}{:<24}{:<16}{}\n", "lever", "objects",
-                                 "candidates/s, ratio", "rank", "pose error, mm", "success (95 %)", "time to plan",
-                                 "denied  same plan");
+  std::string text =
+      fmt::format("{:<11}{:>7}  {:<22}{:<8}{:<20}{:<24}{:<16}{}\n", "lever", "objects", "candidates/s, ratio", "rank",
+                  "pose error, mm", "success (95 %)", "time to plan", "denied  same plan");
   for (const LeverResult& r : results.levers) {
     const Interval interval = r.ratios.empty() ? Interval{} : median_interval(r.ratios);
     const auto rank = median_or_none(r.correlations), time = median_or_none(r.time_ratios);
@@ -373,9 +377,12 @@ std::string to_text(const CheapPhysics& results) {
         "{:<11}{:>7}  {:<22}{:<8}{:<20}{:<24}{:<16}{}\n", r.name, r.objects,
         r.ratios.empty() ? "" : fmt::format("{:.2f} ({:.2f} .. {:.2f})", median(r.ratios), interval.low, interval.high),
         rank ? fmt::format("{:.2f}", *rank) : "",
-        r.pose_errors.empty() ? "" : fmt::format("{:.2f}, 90 % {:.1f}", 1e3 * median(r.pose_errors), 1e3 * quantile(r.pose_errors, 0.9)),
+        r.pose_errors.empty()
+            ? ""
+            : fmt::format("{:.2f}, 90 % {:.1f}", 1e3 * median(r.pose_errors), 1e3 * quantile(r.pose_errors, 0.9)),
         r.worlds ? fmt::format("{}/{} ({:.2f} .. {:.2f})", r.executed, r.worlds, share.low, share.high) : "",
-        time ? fmt::format("{:.2f} x faster", *time) : "", r.worlds ? fmt::format("{:<8}{}/{}", r.denials, r.same_plans, r.worlds) : "");
+        time ? fmt::format("{:.2f} x faster", *time) : "",
+        r.worlds ? fmt::format("{:<8}{}/{}", r.denials, r.same_plans, r.worlds) : "");
   }
   for (const LeverResult& r : results.levers) {
     const std::vector<double> seconds = demo_seconds(results, r.name);
@@ -413,7 +420,8 @@ nlohmann::json to_json(const CheapPhysics& results) {
          {"same_plans", r.same_plans}});
   }
   for (const DemoPlan& plan : results.demo) {
-    json["demo"].push_back({{"lever", plan.lever}, {"seed", plan.seed}, {"planned", plan.planned}, {"plan_seconds", plan.seconds}});
+    json["demo"].push_back(
+        {{"lever", plan.lever}, {"seed", plan.seed}, {"planned", plan.planned}, {"plan_seconds", plan.seconds}});
   }
   return json;
 }
@@ -425,7 +433,8 @@ Result<std::vector<Curve>> compare_peers(Pool& pool, const PbstoOptions& shipped
   std::vector<Scene> scenes;
   for (const int objects : options.sizes) {
     for (int seed = 1; seed <= options.worlds; ++seed) {
-      auto scene_result = physics_pool::generate_chapter3({.objects = objects, .seed = static_cast<std::uint64_t>(seed)});
+      auto scene_result =
+          physics_pool::generate_chapter3({.objects = objects, .seed = static_cast<std::uint64_t>(seed)});
       if (!scene_result) return scene_result.error();
       scenes.push_back(std::move(scene_result).value());
     }

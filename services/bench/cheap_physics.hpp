@@ -32,18 +32,18 @@ struct CheapPhysicsOptions {
   std::vector<Lever> levers;
   /// What to measure: any of speed, truth, success, demo, peers.
   std::vector<std::string> parts{"speed", "truth", "success", "demo", "peers"};
-  planners::ControlOptions control;    ///< initial_steps, many_iterations and step_duration
+  planners::ControlOptions control;       ///< initial_steps, many_iterations and step_duration
   std::vector<int> sizes{5, 10, 15, 40};  ///< objects beside the target
-  int worlds = 3;                      ///< of each size, seeds 1 to this
-  int repeats = 3;                     ///< of each world's speed measurement
-  int iterations = 2;                  ///< of a planner whose speed is measured
-  std::uint32_t samples = 16;          ///< per world, whose costs and poses are compared
-  int executed_objects = 15;           ///< of the worlds that are planned and executed
-  int executed_worlds = 20;            ///< seeds 1 to this
-  int large_iterations = 12;           ///< of plans in worlds of more objects, which take minutes
+  int worlds = 3;                         ///< of each size, seeds 1 to this
+  int repeats = 3;                        ///< of each world's speed measurement
+  int iterations = 2;                     ///< of a planner whose speed is measured
+  std::uint32_t samples = 16;             ///< per world, whose costs and poses are compared
+  int executed_objects = 15;              ///< of the worlds that are planned and executed
+  int executed_worlds = 20;               ///< seeds 1 to this
+  int large_iterations = 12;              ///< of plans in worlds of more objects, which take minutes
   std::vector<physics_pool::Scene> demo;  ///< planned only, with each of demo_seeds
   int demo_seeds = 5;
-  std::uint64_t peer_rollouts = 150;   ///< of each peer in each world
+  std::uint64_t peer_rollouts = 150;                ///< of each peer in each world
   std::function<void(const std::string&)> on_news;  ///< a line now and then
 };
 
@@ -51,13 +51,13 @@ struct CheapPhysicsOptions {
 struct LeverResult {
   std::string name;
   int objects = 0;
-  std::vector<double> ratios;      ///< candidates per second, losers not stopped; one per world and repeat
+  std::vector<double> ratios;        ///< candidates per second, losers not stopped; one per world and repeat
   std::vector<double> correlations;  ///< per world: Spearman's, of what ranks candidates first with full physics
   std::vector<double> pose_errors;   ///< m, last position of each object that full physics moved by 1 mm
   int planned = 0, executed = 0, worlds = 0;  ///< success predicted; success in the full world
-  std::vector<double> time_ratios;   ///< seconds to success, first lever's / this one's, where both planned
-  int denials = 0;                   ///< successes it claimed that full physics denied, over all worlds
-  int same_plans = 0;                ///< plans that are the first lever's, bit for bit
+  std::vector<double> time_ratios;            ///< seconds to success, first lever's / this one's, where both planned
+  int denials = 0;                            ///< successes it claimed that full physics denied, over all worlds
+  int same_plans = 0;                         ///< plans that are the first lever's, bit for bit
 };
 
 /// The demo's scene with one seed.

@@ -33,8 +33,7 @@ class AtFidelity final : public Pool {
   AtFidelity(Pool& pool, const physics_pool::Fidelity& fidelity) : pool_(pool), fidelity_(fidelity) {}
 
   Result<Hash> load(const Scene& scene) override { return pool_.load(scene); }
-  Result<BatchReply> run(const RolloutBatch& batch, physics_pool::TimePoint deadline,
-                         std::stop_token stop) override {
+  Result<BatchReply> run(const RolloutBatch& batch, physics_pool::TimePoint deadline, std::stop_token stop) override {
     RolloutBatch same = batch;
     if (same.fidelity == physics_pool::Fidelity{}) same.fidelity = fidelity_;
     return pool_.run(same, deadline, stop);
@@ -87,8 +86,8 @@ struct Arena {
     auto world_result = pool.load(scene);
     if (!world_result) return world_result.error();
     Arena arena{.scene = scene, .problem = {.world = *world_result, .x0 = physics_pool::initial_state(scene)}};
-    arena.problem.initial = planners::straight_line(physics_pool::TaskGeometry(scene), arena.problem.x0,
-                                                    options.steps, options.step_duration);
+    arena.problem.initial = planners::straight_line(physics_pool::TaskGeometry(scene), arena.problem.x0, options.steps,
+                                                    options.step_duration);
     return arena;
   }
 };
@@ -108,7 +107,8 @@ Result<Curve> search(Pool& pool, const Arena& arena, const Contender& contender,
   });
   planners::Problem problem = arena.problem;
   problem.seed = seed;
-  problem.iterations = static_cast<int>(std::min<std::uint64_t>(options.rollouts, 1'000'000));  // each costs one or more
+  problem.iterations =
+      static_cast<int>(std::min<std::uint64_t>(options.rollouts, 1'000'000));  // each costs one or more
   auto plan_result = planner->plan(problem, physics_pool::TimePoint::max(), enough.get_token());
   if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
   const bool spent = !curve.points.empty() && curve.points.back().rollouts >= options.rollouts;
@@ -176,11 +176,13 @@ std::vector<Contender> usual_contenders() {
 Result<std::vector<Curve>> measure_convergence(Pool& pool, const std::vector<Scene>& scenes,
                                                const ConvergenceOptions& options, const OnCurve& on_curve,
                                                std::stop_token stop) {
-  if (options.contenders.empty() || scenes.empty() || options.seeds.empty() || options.rollouts < 1 || options.steps < 1) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("convergence: got {} contenders, {} scenes, {} seeds, {} rollouts and {} steps, "
-                             "wanted at least one of each", options.contenders.size(), scenes.size(),
-                             options.seeds.size(), options.rollouts, options.steps)};
+  if (options.contenders.empty() || scenes.empty() || options.seeds.empty() || options.rollouts < 1 ||
+      options.steps < 1) {
+    return Error{
+        Code::kInvalidArgument,
+        fmt::format("convergence: got {} contenders, {} scenes, {} seeds, {} rollouts and {} steps, "
+                    "wanted at least one of each",
+                    options.contenders.size(), scenes.size(), options.seeds.size(), options.rollouts, options.steps)};
   }
   AtFidelity same(pool, options.fidelity);
   ConvergenceOptions endless = options;
@@ -215,8 +217,8 @@ std::vector<Summary> summarize(const std::vector<Curve>& curves, Spent spent, in
   for (const std::string& method : methods) {
     std::vector<const Curve*> own;
     for (const Curve& curve : curves) {
-      const bool comparable = !curve.points.empty() && curve.points.front().cost > 0 &&
-                              std::isfinite(curve.points.front().cost);
+      const bool comparable =
+          !curve.points.empty() && curve.points.front().cost > 0 && std::isfinite(curve.points.front().cost);
       if (curve.method == method && comparable) own.push_back(&curve);
     }
     if (!own.empty()) summaries.push_back(summarize(own, spent, points));

@@ -24,7 +24,8 @@ struct ConvergenceOptions;
 struct Contender {
   std::string name;
   std::function<std::unique_ptr<planners::Planner>(physics_pool::Pool&, const ConvergenceOptions&,
-                                                   planners::OnProgress)> make;
+                                                   planners::OnProgress)>
+      make;
 };
 
 /// PBSTO greedy (the thesis's) and cost-weighted, predictive sampling, MPPI, CEM
@@ -35,14 +36,14 @@ std::vector<Contender> usual_contenders();
 
 struct ConvergenceOptions {
   std::vector<Contender> contenders = usual_contenders();
-  std::uint64_t rollouts = 400;          ///< a search ends after the iteration that reaches it, >= 1
-  std::vector<std::uint64_t> seeds{1};   ///< of the noise; every world with each
+  std::uint64_t rollouts = 400;         ///< a search ends after the iteration that reaches it, >= 1
+  std::vector<std::uint64_t> seeds{1};  ///< of the noise; every world with each
   /// Rollouts per iteration, of iCEM in the first one; CEM fits a deviation to a
   /// quarter of them, which asks for more than the thesis's 8.
   int batch = 16;
-  int steps = 6;                         ///< n of the straight line that all begin with, >= 1
-  double step_duration = 1.0;            ///< Delta_t, s
-  physics_pool::Fidelity fidelity;       ///< of every rollout whose planner asks for no other
+  int steps = 6;                    ///< n of the straight line that all begin with, >= 1
+  double step_duration = 1.0;       ///< Delta_t, s
+  physics_pool::Fidelity fidelity;  ///< of every rollout whose planner asks for no other
   /// Its success_cost does not count: it becomes 0, which no rollout that moves
   /// the hand reaches, so that nobody ends early. A search that succeeds after
   /// ten rollouts would say nothing about the next three hundred.
@@ -71,8 +72,7 @@ using OnCurve = std::function<void(const Curve&, std::size_t done, std::size_t t
 /// Errors   kInvalidArgument  nothing to measure
 ///          kCancelled        a stop was requested
 ///          those of the pool and of Planner::plan
-Result<std::vector<Curve>> measure_convergence(physics_pool::Pool& pool,
-                                               const std::vector<physics_pool::Scene>& scenes,
+Result<std::vector<Curve>> measure_convergence(physics_pool::Pool& pool, const std::vector<physics_pool::Scene>& scenes,
                                                const ConvergenceOptions& options, const OnCurve& on_curve = {},
                                                std::stop_token stop = {});
 

@@ -39,7 +39,8 @@ constexpr auto kBenchmarks = std::to_array<Benchmark>({
     {"parareal", "Parareal on all processors against what Eq. 6.4 allows", 15, measure_parareal},
     {"parareal-scheduling", "Parareal on 4 to 32 waiting workers against Eq. 6.4", 9, measure_parareal_scheduling},
     {"hosts", "between two hosts: round trip and throughput, protected against unprotected", 9, measure_hosts},
-    {"hosts-scheduling", "waiting workers on several hosts against workers that never idle", 5, measure_hosts_scheduling},
+    {"hosts-scheduling", "waiting workers on several hosts against workers that never idle", 5,
+     measure_hosts_scheduling},
     {"unplugged", "work one of whose two hosts is unplugged for a while against work left alone", 5, measure_unplugged},
 });
 
@@ -49,8 +50,10 @@ constexpr const char* kPool = "pool";
 constexpr const char* kRecord = "record";
 
 int list() {
-  fmt::print("{:<20} {}\n", kChaos, "plans while workers are killed, stalled and unplugged: all bit-equal, and how slow");
-  fmt::print("{:<20} {}\n", kCheapPhysics, "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers");
+  fmt::print("{:<20} {}\n", kChaos,
+             "plans while workers are killed, stalled and unplugged: all bit-equal, and how slow");
+  fmt::print("{:<20} {}\n", kCheapPhysics,
+             "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers");
   fmt::print("{:<20} {}\n", kPool, "what each worker did when: busy shares, gaps, a picture");
   fmt::print("{:<20} {}\n", kRecord, "the recorder at 20,000 messages per second, or what it costs a plan");
   for (const Benchmark& benchmark : kBenchmarks) fmt::print("{:<20} {}\n", benchmark.name, benchmark.purpose);
@@ -76,12 +79,12 @@ int perform(const Benchmark& benchmark, Settings settings, const std::string& js
 
 int compare_levers(const Settings& settings, const std::string& json, const std::string& plot, int worlds,
                    const std::vector<std::string>& parts) {
-  CheapPhysicsOptions options{.parts = parts,
-                              .executed_worlds = worlds,
-                              .on_news = [](const std::string& line) { fmt::print(stderr, "{}\n", line); }};
+  CheapPhysicsOptions options{.parts = parts, .executed_worlds = worlds, .on_news = [](const std::string& line) {
+                                fmt::print(stderr, "{}\n", line);
+                              }};
   if (settings.repeats > 0) options.repeats = settings.repeats;
-  const auto ok = bench_cheap_physics(options, {.json = json, .plot = plot}, data_file("experiments/grasping.yaml"),
-                                      settings.stop);
+  const auto ok =
+      bench_cheap_physics(options, {.json = json, .plot = plot}, data_file("experiments/grasping.yaml"), settings.stop);
   return ok ? kExitOk : fail(ok.error(), kExitBroken);
 }
 
@@ -122,8 +125,9 @@ int start(const std::string& name, const Settings& settings, const std::string& 
   if (name == "echo") return serve_echo(settings.domain, settings.stop);
   const auto benchmark = std::ranges::find(kBenchmarks, name, [](const Benchmark& b) { return std::string(b.name); });
   if (benchmark == kBenchmarks.end()) {
-    return fail({Code::kInvalidArgument,
-                 fmt::format("name: got '{}', wanted one that `jostle bench list` shows", name)}, kExitUsage);
+    return fail(
+        {Code::kInvalidArgument, fmt::format("name: got '{}', wanted one that `jostle bench list` shows", name)},
+        kExitUsage);
   }
   return perform(*benchmark, settings, json);
 }
@@ -144,31 +148,46 @@ int main(int argc, char** argv) {
   app.add_option("--json", json, "File for all numbers");
   app.add_option("--plot", plot, "Of cheap-physics: PNG of cost against rollouts and against time");
   app.add_option("--parts", parts, "Of cheap-physics: what to measure")
-      ->capture_default_str()->delimiter(',')->check(CLI::IsMember(parts));
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::IsMember(parts));
   app.add_option("--worlds", worlds, "Of cheap-physics: worlds of 15 objects that are planned and executed")
-      ->capture_default_str()->check(CLI::Range(1, 1000));
-  app.add_option("--workers", settings.workers, "Of scheduling, hosts-scheduling: worker processes, such as 8,16,64 (default: 64);\n"
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--workers", settings.workers,
+                 "Of scheduling, hosts-scheduling: worker processes, such as 8,16,64 (default: 64);\n"
                  "of pool: their number (default: one per core this process may use); of chaos: theirs (default: 4)")
-      ->delimiter(',')->check(CLI::Range(1, 1024));
+      ->delimiter(',')
+      ->check(CLI::Range(1, 1024));
   ChaosOptions chaos;
   app.add_option("--seed", chaos.seed, "Of chaos: of its schedule")->capture_default_str();
-  app.add_option("--faults", chaos.faults, "Of chaos: how many")->capture_default_str()->check(CLI::Range(1, 1'000'000));
+  app.add_option("--faults", chaos.faults, "Of chaos: how many")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1'000'000));
   PoolTimelineOptions timeline;
   bool pin = false;
   app.add_option("--timeline", timeline.picture, "Of pool: PNG or SVG of what each worker did when");
-  app.add_option("--clients", timeline.clients, "Of pool: clients at once, each with shorter samples than the one before")
-      ->capture_default_str()->check(CLI::Range(1, 8));
+  app.add_option("--clients", timeline.clients,
+                 "Of pool: clients at once, each with shorter samples than the one before")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 8));
   app.add_flag("--urgent", timeline.urgent, "Of pool: the last client's batches are urgent");
   app.add_flag("--pin", pin, "Of pool: give each worker a core of its own, in turn");
   RecordBenchOptions recording;
   bool disturbance = false;
-  app.add_option("--rate", recording.rate, "Of record: messages of 1 KiB per second")->capture_default_str()->check(CLI::Range(1.0, 1e6));
-  app.add_option("--seconds", recording.seconds, "Of record: how long")->capture_default_str()->check(CLI::Range(0.1, 86400.0));
+  app.add_option("--rate", recording.rate, "Of record: messages of 1 KiB per second")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 1e6));
+  app.add_option("--seconds", recording.seconds, "Of record: how long")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 86400.0));
   app.add_flag("--disturbance", disturbance, "Of record: the time of a plan with and without a recorder instead");
   add_network_options(app);
-  auto* domain = app.add_option("--domain", settings.domain, "DDS domain (default: one of its own, 1 to 100)")->check(CLI::Range(0, 232));
-  app.footer("Exit codes: 0 measured, 1 the two sides computed different things, 2 bad arguments,\n"
-             "3 a part of the system failed, 130 interrupted. Slowness is no failure.");
+  auto* domain = app.add_option("--domain", settings.domain, "DDS domain (default: one of its own, 1 to 100)")
+                     ->check(CLI::Range(0, 232));
+  app.footer(
+      "Exit codes: 0 measured, 1 the two sides computed different things, 2 bad arguments,\n"
+      "3 a part of the system failed, 130 interrupted. Slowness is no failure.");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   // Neither a user's system nor another benchmark is in the way.
   std::optional<OwnDomain> own;

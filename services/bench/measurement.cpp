@@ -94,21 +94,21 @@ Result<Measurement> compare(const Side& a, const Side& b, const Turns& turns) {
 
 std::string one_line(const Measurement& measurement) {
   return fmt::format("{}: {} {:.5g} {}, {} {:.5g} {}, ratio {:.3f}", measurement.name, measurement.name_a,
-                     median(measurement.a), measurement.unit, measurement.name_b, median(measurement.b), measurement.unit,
-                     measurement.ratio());
+                     median(measurement.a), measurement.unit, measurement.name_b, median(measurement.b),
+                     measurement.unit, measurement.ratio());
 }
 
 std::string to_text(const Measurement& measurement) {
   const Interval interval = measurement.interval();
   const double ratio = measurement.ratio();
   std::string text = fmt::format("{}: {} against {}\n  ratio {:.3f}  ({:.3f} .. {:.3f}, {} repeats, load {:.1f})",
-                                 measurement.name, measurement.name_a, measurement.name_b, ratio,
-                                 interval.low, interval.high, measurement.a.size(), measurement.load);
+                                 measurement.name, measurement.name_a, measurement.name_b, ratio, interval.low,
+                                 interval.high, measurement.a.size(), measurement.load);
   if (measurement.aim) {
     text += fmt::format("  aim {}: {}", to_text(*measurement.aim), measurement.aim->met_by(ratio) ? "met" : "missed");
   }
-  const auto side = [&](const std::string& name, const std::vector<double>& values,
-                        const std::vector<double>& cpu, const Hash& hash) {
+  const auto side = [&](const std::string& name, const std::vector<double>& values, const std::vector<double>& cpu,
+                        const Hash& hash) {
     text += fmt::format("\n  {:<18} {:>12.5g} {}  {:.3f} cpu s  {}", name, median(values), measurement.unit,
                         median(cpu), to_string(hash));
   };

@@ -30,8 +30,14 @@ Scene sliders_in_a_row(int sliders, const std::string& integrator) {
   scene.robot.model = "pusher";
   scene.robot.x = -0.066;
   for (int i = 0; i < sliders; ++i) {
-    scene.objects.push_back({.name = fmt::format("slider{}", i), .shape = Shape::kCylinder, .radius = 0.05115,
-                             .height = 0.0245, .mass = 0.5, .friction = 0.2, .x = 0.105 * i, .y = i % 2 ? 0.03 : 0.0});
+    scene.objects.push_back({.name = fmt::format("slider{}", i),
+                             .shape = Shape::kCylinder,
+                             .radius = 0.05115,
+                             .height = 0.0245,
+                             .mass = 0.5,
+                             .friction = 0.2,
+                             .x = 0.105 * i,
+                             .y = i % 2 ? 0.03 : 0.0});
   }
   scene.task = {.kind = "push", .target = "slider0"};
   scene.physics.time_step = 0.001;
@@ -164,16 +170,16 @@ Result<Measurement> measure_speed_up(int steps, int iterations, const Settings& 
   const double allowed = parareal_speed_up(iterations, threads, steps, costs_result->coarse, costs_result->fine);
 
   std::vector<double> serial;
-  auto result = compare({fmt::format("serial fine / {:.2f} (Eq. 6.4)", allowed),
-                         [&]() -> Result<Sample> {
-                           auto sample_result = time_prediction(one, batch, settings.stop);
-                           if (!sample_result) return sample_result;
-                           serial.push_back(sample_result->value);
-                           return Sample{.value = sample_result->value / allowed, .hash = wanted_result->hash};
-                         }},
-                        {fmt::format("Parareal, {} threads", threads),
-                         [&] { return time_prediction(parareal, batch, settings.stop); }},
-                        Turns{.repeats = settings.repeats, .stop = settings.stop});
+  auto result = compare(
+      {fmt::format("serial fine / {:.2f} (Eq. 6.4)", allowed),
+       [&]() -> Result<Sample> {
+         auto sample_result = time_prediction(one, batch, settings.stop);
+         if (!sample_result) return sample_result;
+         serial.push_back(sample_result->value);
+         return Sample{.value = sample_result->value / allowed, .hash = wanted_result->hash};
+       }},
+      {fmt::format("Parareal, {} threads", threads), [&] { return time_prediction(parareal, batch, settings.stop); }},
+      Turns{.repeats = settings.repeats, .stop = settings.stop});
   if (!result) return result.error();
   result->name = fmt::format("parareal/N={}/K={}", steps, iterations);
   result->unit = "ms";
@@ -250,10 +256,11 @@ Result<Measurement> measure_waiting(int steps, int iterations, const Settings& s
   const double allowed = parareal_speed_up(iterations, steps, steps, costs_result->coarse, costs_result->fine);
   const double expected = 1e3 * steps * costs_result->fine / allowed;
 
-  auto result = compare({"Eq. 6.4", [&]() -> Result<Sample> { return Sample{.value = expected, .hash = known_result->hash}; }},
-                        {fmt::format("Parareal, {} waiting workers", steps),
-                         [&] { return time_prediction(parareal, batch, settings.stop); }},
-                        (*swarm_result)->turns(settings.repeats, settings.stop));
+  auto result =
+      compare({"Eq. 6.4", [&]() -> Result<Sample> { return Sample{.value = expected, .hash = known_result->hash}; }},
+              {fmt::format("Parareal, {} waiting workers", steps),
+               [&] { return time_prediction(parareal, batch, settings.stop); }},
+              (*swarm_result)->turns(settings.repeats, settings.stop));
   if (!result) return result.error();
   result->name = fmt::format("parareal-scheduling/N={}/K={}", steps, iterations);
   result->unit = "ms";

@@ -10,11 +10,9 @@ Result<PlanAgain> PlanAgain::make(physics_pool::Pool& pool, int iterations) {
   auto world_result = pool.load(*scene_result);
   if (!world_result) return world_result.error();
   const physics_pool::RolloutBatch straight = push(*scene_result, 3, 1.0, 1);
-  return PlanAgain(pool, {.world = *world_result,
-                          .x0 = straight.x0,
-                          .initial = straight.nominal,
-                          .iterations = iterations,
-                          .seed = 1});
+  return PlanAgain(
+      pool,
+      {.world = *world_result, .x0 = straight.x0, .initial = straight.nominal, .iterations = iterations, .seed = 1});
 }
 
 Result<Sample> PlanAgain::run(physics_pool::TimePoint deadline, std::stop_token stop) const {

@@ -27,8 +27,8 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 using Bytes = std::vector<std::byte>;
 
-constexpr int kMessages = 5000;          // 1000 per second, 5 s
-constexpr double kMeanGap = 1e6;         // ns; gaps are exponential, so some are tiny
+constexpr int kMessages = 5000;   // 1000 per second, 5 s
+constexpr double kMeanGap = 1e6;  // ns; gaps are exponential, so some are tiny
 constexpr std::array kRates{0.1, 0.5, 1.0, 2.0, 10.0};
 constexpr std::chrono::minutes kLongest{3};  // of one playback; the slowest takes 50 s
 constexpr std::chrono::seconds kLastOnes{2};
@@ -73,11 +73,15 @@ Result<void> write_bag(const fs::path& folder, const std::vector<Planned>& messa
   auto writer_result = bag::BagWriter::create(folder, {});
   if (!writer_result) return writer_result.error();
   for (const TopicKind& topic : kTopics) {
-    const auto added = (*writer_result)->add_topic({.name = topic.name, .type = kType, .qos = topic.qos, .definition = "uint8[] data\n"});
+    const auto added =
+        (*writer_result)
+            ->add_topic({.name = topic.name, .type = kType, .qos = topic.qos, .definition = "uint8[] data\n"});
     if (!added) return added.error();
   }
   for (const Planned& message : messages) {
-    auto ok = (*writer_result)->write(static_cast<int>(message.topic), {.log_time = message.time, .publish_time = message.time, .data = message.data});
+    auto ok = (*writer_result)
+                  ->write(static_cast<int>(message.topic),
+                          {.log_time = message.time, .publish_time = message.time, .data = message.data});
     if (!ok) return ok;
   }
   return (*writer_result)->close();
@@ -102,7 +106,8 @@ class Subscriber {
   explicit Subscriber(const dds::Participant& participant) {
     for (const TopicKind& topic : kTopics) {
       readers_.push_back(std::make_unique<dds::RawReader>(
-          participant, dds::RawTopic{dds::wire_topic(topic.name), dds::wire_type(kType).value(), {.depth = dds::kKeepAll}},
+          participant,
+          dds::RawTopic{dds::wire_topic(topic.name), dds::wire_type(kType).value(), {.depth = dds::kKeepAll}},
           [this](std::span<const std::byte> data, const dds::Origin&) { take(data); }));
     }
   }
@@ -131,7 +136,7 @@ class Subscriber {
 
 // Over the runs that count.
 struct Findings {
-  std::vector<double> spacing, offset;             // ms, of every message
+  std::vector<double> spacing, offset;                    // ms, of every message
   std::vector<double> late_median, late_p99, late_worst;  // ms, as the player says, of every run
   std::size_t arrived = 0, pairs = 0, pairs_in_order = 0;
   int runs = 0;
@@ -168,25 +173,27 @@ class PlayBench {
     if (!result) return result.error();
     result->name = fmt::format("play/{:g}", rate);
     result->unit = "ms";
-    result->details = {{"runs", findings.runs},
-                       {"messages", static_cast<double>(kMessages) * findings.runs},
-                       {"share", static_cast<double>(findings.arrived) / (static_cast<double>(kMessages) * findings.runs)},
-                       {"order_within_topics", findings.ordered},
-                       {"order_across_topics", static_cast<double>(findings.pairs_in_order) / static_cast<double>(findings.pairs)},
-                       {"spacing_median_ms", median(findings.spacing)},
-                       {"spacing_p99_ms", quantile(findings.spacing, 0.99)},
-                       {"spacing_worst_ms", quantile(findings.spacing, 1.0)},
-                       {"offset_p99_ms", quantile(findings.offset, 0.99)},
-                       {"sent_late_median_ms", median(findings.late_median)},
-                       {"sent_late_p99_ms", median(findings.late_p99)},
-                       {"sent_late_worst_ms", quantile(findings.late_worst, 1.0)}};
+    result->details = {
+        {"runs", findings.runs},
+        {"messages", static_cast<double>(kMessages) * findings.runs},
+        {"share", static_cast<double>(findings.arrived) / (static_cast<double>(kMessages) * findings.runs)},
+        {"order_within_topics", findings.ordered},
+        {"order_across_topics", static_cast<double>(findings.pairs_in_order) / static_cast<double>(findings.pairs)},
+        {"spacing_median_ms", median(findings.spacing)},
+        {"spacing_p99_ms", quantile(findings.spacing, 0.99)},
+        {"spacing_worst_ms", quantile(findings.spacing, 1.0)},
+        {"offset_p99_ms", quantile(findings.offset, 0.99)},
+        {"sent_late_median_ms", median(findings.late_median)},
+        {"sent_late_p99_ms", median(findings.late_p99)},
+        {"sent_late_worst_ms", quantile(findings.late_worst, 1.0)}};
     return result;
   }
 
   Sample as_recorded(double rate) const {
     std::vector<std::pair<int, std::span<const std::byte>>> all;
     for (int i = 0; i < kMessages; ++i) all.emplace_back(i, messages_[static_cast<std::size_t>(i)].data);
-    return {.value = 1e-6 * static_cast<double>(messages_.back().time - messages_.front().time) / rate, .hash = hash_of_all(all)};
+    return {.value = 1e-6 * static_cast<double>(messages_.back().time - messages_.front().time) / rate,
+            .hash = hash_of_all(all)};
   }
 
   Result<Sample> play(double rate, Findings& findings) {
@@ -194,22 +201,26 @@ class PlayBench {
     const fs::path report = folder_ / "report.json";
     auto player_result = ChildProcess::start(
         program_folder() / "jostle_play",
-        {(folder_ / "bag").string(), "--rate", fmt::format("{}", rate), "--wait-for-subscribers=1", "--json", report.string(), "--domain",
-         std::to_string(settings_.domain), "--die-with-parent", std::to_string(getpid())},
+        {(folder_ / "bag").string(), "--rate", fmt::format("{}", rate), "--wait-for-subscribers=1", "--json",
+         report.string(), "--domain", std::to_string(settings_.domain), "--die-with-parent", std::to_string(getpid())},
         folder_ / "player.log");
     if (!player_result) return player_result.error();
     const auto end = Clock::now() + kLongest;
     while (!player_result->ended()) {
       if (settings_.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
-      if (Clock::now() >= end) return Error{Code::kUnavailable, "jostle_play: does not end: " + player_result->last_words()};
+      if (Clock::now() >= end)
+        return Error{Code::kUnavailable, "jostle_play: does not end: " + player_result->last_words()};
       usleep(20'000);
     }
     if (player_result->ended() != "exit code 0") {
-      return Error{Code::kUnavailable, fmt::format("jostle_play: {}: {}", *player_result->ended(), player_result->last_words())};
+      return Error{Code::kUnavailable,
+                   fmt::format("jostle_play: {}: {}", *player_result->ended(), player_result->last_words())};
     }
-    for (const auto last = Clock::now() + kLastOnes; subscriber_->count() < kMessages && Clock::now() < last;) usleep(1000);
+    for (const auto last = Clock::now() + kLastOnes; subscriber_->count() < kMessages && Clock::now() < last;)
+      usleep(1000);
     const auto arrivals = subscriber_->take_all();
-    if (arrivals.size() < 2) return Error{Code::kUnavailable, fmt::format("got {} messages, wanted {}", arrivals.size(), kMessages)};
+    if (arrivals.size() < 2)
+      return Error{Code::kUnavailable, fmt::format("got {} messages, wanted {}", arrivals.size(), kMessages)};
     if (const bool counts = runs_++ % (settings_.repeats + 1) != 0; counts) judge(arrivals, rate, report, findings);
     std::vector<std::pair<int, std::span<const std::byte>>> all;
     for (const Arrival& arrival : arrivals) all.emplace_back(arrival.index, arrival.data);
@@ -236,7 +247,9 @@ class PlayBench {
     ++findings.runs;
     for (std::size_t i = 1; i < times.size(); ++i) {
       if (!times[i]) continue;
-      const auto wanted = [&](std::size_t from) { return 1e-6 * static_cast<double>(messages_[i].time - messages_[from].time) / rate; };
+      const auto wanted = [&](std::size_t from) {
+        return 1e-6 * static_cast<double>(messages_[i].time - messages_[from].time) / rate;
+      };
       if (times[i - 1]) findings.spacing.push_back(std::abs(milliseconds(*times[i] - *times[i - 1]) - wanted(i - 1)));
       if (times[0]) findings.offset.push_back(std::abs(milliseconds(*times[i] - *times[0]) - wanted(0)));
     }
@@ -252,7 +265,9 @@ class PlayBench {
   static double cpu_with_children() {
     rusage usage{};
     getrusage(RUSAGE_CHILDREN, &usage);
-    const auto seconds = [](const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); };
+    const auto seconds = [](const timeval& time) {
+      return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+    };
     return own_cpu_seconds() + seconds(usage.ru_utime) + seconds(usage.ru_stime);
   }
 

@@ -22,8 +22,8 @@ using physics_pool::RolloutBatch;
 
 constexpr std::uint32_t kSamplesPerWorker = 12;  // of a batch of long samples
 constexpr int kObjects = 5;
-constexpr double kStep = 0.5;  // s
-constexpr int kLongest = 4;    // steps
+constexpr double kStep = 0.5;             // s
+constexpr int kLongest = 4;               // steps
 constexpr std::size_t kBatchesNamed = 7;  // as many as there are colours
 
 double milliseconds(double seconds) { return 1e3 * seconds; }
@@ -90,7 +90,8 @@ struct Legend {
   std::map<std::pair<std::uint64_t, std::uint64_t>, int> of;  // by client and epoch
 };
 
-Legend legend_of(const Timeline& timeline, const std::vector<std::uint64_t>& clients, const std::vector<RolloutBatch>& batches) {
+Legend legend_of(const Timeline& timeline, const std::vector<std::uint64_t>& clients,
+                 const std::vector<RolloutBatch>& batches) {
   Legend legend;
   for (const Timeline::Bar& bar : timeline.bars) legend.of[{bar.client, bar.epoch}] = 0;
   if (clients.size() > 1) {
@@ -100,14 +101,17 @@ Legend legend_of(const Timeline& timeline, const std::vector<std::uint64_t>& cli
                                           batch.priority == physics_pool::Priority::kUrgent ? ", urgent" : "",
                                           batch.nominal.steps() * batch.step_duration));
     }
-    for (auto& [id, series] : legend.of) series = static_cast<int>(std::ranges::find(clients, id.first) - clients.begin());
+    for (auto& [id, series] : legend.of)
+      series = static_cast<int>(std::ranges::find(clients, id.first) - clients.begin());
     return legend;
   }
   std::size_t batch = 0;
   for (auto& [id, series] : legend.of) {
     series = static_cast<int>(batch % kBatchesNamed);
-    if (batch < kBatchesNamed) legend.series.push_back(fmt::format("batch {}", batch + 1));
-    else if (batch < 2 * kBatchesNamed) legend.series[batch % kBatchesNamed] += fmt::format(", {} …", batch + 1);
+    if (batch < kBatchesNamed)
+      legend.series.push_back(fmt::format("batch {}", batch + 1));
+    else if (batch < 2 * kBatchesNamed)
+      legend.series[batch % kBatchesNamed] += fmt::format(", {} …", batch + 1);
     ++batch;
   }
   return legend;
@@ -116,20 +120,25 @@ Legend legend_of(const Timeline& timeline, const std::vector<std::uint64_t>& cli
 std::string headline(const Timeline& timeline, const PoolTimelineOptions& options) {
   return fmt::format("{} worker{}{}, {} client{}, {} batch{}{}: busy {:.1f} % of {:.0f} ms", options.workers,
                      options.workers == 1 ? "" : "s", options.cores.empty() ? "" : " pinned", options.clients,
-                     options.clients == 1 ? "" : "s", options.batches, options.batches == 1 ? "" : "es", options.clients == 1 ? "" : " each",
-                     100 * timeline.efficiency, milliseconds(timeline.length));
+                     options.clients == 1 ? "" : "s", options.batches, options.batches == 1 ? "" : "es",
+                     options.clients == 1 ? "" : " each", 100 * timeline.efficiency, milliseconds(timeline.length));
 }
 
 LaneChart chart_of(const Timeline& timeline, const Legend& legend, const std::string& title) {
-  LaneChart chart{.title = title, .x_label = "ms since the first task was sent", .series = legend.series,
+  LaneChart chart{.title = title,
+                  .x_label = "ms since the first task was sent",
+                  .series = legend.series,
                   .length = milliseconds(timeline.length)};
   const bool threads = std::ranges::any_of(timeline.rows, [](const Timeline::Row& row) { return row.thread > 0; });
   for (const Timeline::Row& row : timeline.rows) {
     chart.lanes.push_back(threads ? fmt::format("{}/{}", row.worker, row.thread) : row.worker);
   }
   for (const Timeline::Bar& bar : timeline.bars) {
-    chart.bars.push_back({.lane = bar.row, .series = legend.of.at({bar.client, bar.epoch}), .from = milliseconds(bar.from),
-                          .to = milliseconds(bar.to), .hatched = !bar.first});
+    chart.bars.push_back({.lane = bar.row,
+                          .series = legend.of.at({bar.client, bar.epoch}),
+                          .from = milliseconds(bar.from),
+                          .to = milliseconds(bar.to),
+                          .hatched = !bar.first});
     if (!bar.first) chart.hatched = "copy, dropped";
   }
   return chart;
@@ -141,24 +150,38 @@ void print(const Timeline& timeline, const std::string& title) {
     fmt::print("  {:<16} {:>6.1f} % {:>8} {:>7} {:>9.1f} ms\n", fmt::format("{}/{}", row.worker, row.thread),
                100 * row.busy / timeline.length, row.samples, row.copies, milliseconds(row.longest_gap));
   }
-  fmt::print("  a sample is on the way for {:.2f} ms and in line at its worker for {:.2f} ms (medians); clocks agree to {:.2f} ms\n",
-             milliseconds(timeline.on_the_way), milliseconds(timeline.in_line), milliseconds(timeline.clock_error));
+  fmt::print(
+      "  a sample is on the way for {:.2f} ms and in line at its worker for {:.2f} ms (medians); clocks agree to "
+      "{:.2f} ms\n",
+      milliseconds(timeline.on_the_way), milliseconds(timeline.in_line), milliseconds(timeline.clock_error));
 }
 
 std::string to_json(const Timeline& timeline, const Legend& legend, const PoolTimelineOptions& options) {
-  nlohmann::json object{{"workers", options.workers}, {"clients", options.clients}, {"batches", options.batches},
-                        {"pinned", !options.cores.empty()}, {"length_ms", milliseconds(timeline.length)},
-                        {"efficiency", timeline.efficiency}, {"on_the_way_ms", milliseconds(timeline.on_the_way)},
-                        {"in_line_ms", milliseconds(timeline.in_line)}, {"clock_error_ms", milliseconds(timeline.clock_error)},
-                        {"rows", nlohmann::json::array()}, {"bars", nlohmann::json::array()}};
+  nlohmann::json object{{"workers", options.workers},
+                        {"clients", options.clients},
+                        {"batches", options.batches},
+                        {"pinned", !options.cores.empty()},
+                        {"length_ms", milliseconds(timeline.length)},
+                        {"efficiency", timeline.efficiency},
+                        {"on_the_way_ms", milliseconds(timeline.on_the_way)},
+                        {"in_line_ms", milliseconds(timeline.in_line)},
+                        {"clock_error_ms", milliseconds(timeline.clock_error)},
+                        {"rows", nlohmann::json::array()},
+                        {"bars", nlohmann::json::array()}};
   for (const Timeline::Row& row : timeline.rows) {
-    object["rows"].push_back({{"worker", row.worker}, {"thread", row.thread}, {"busy", row.busy / timeline.length},
-                              {"samples", row.samples}, {"copies", row.copies},
+    object["rows"].push_back({{"worker", row.worker},
+                              {"thread", row.thread},
+                              {"busy", row.busy / timeline.length},
+                              {"samples", row.samples},
+                              {"copies", row.copies},
                               {"longest_gap_ms", milliseconds(row.longest_gap)}});
   }
   for (const Timeline::Bar& bar : timeline.bars) {
-    object["bars"].push_back({{"row", bar.row}, {"from_ms", milliseconds(bar.from)}, {"to_ms", milliseconds(bar.to)},
-                              {"series", legend.of.at({bar.client, bar.epoch})}, {"first", bar.first}});
+    object["bars"].push_back({{"row", bar.row},
+                              {"from_ms", milliseconds(bar.from)},
+                              {"to_ms", milliseconds(bar.to)},
+                              {"series", legend.of.at({bar.client, bar.epoch})},
+                              {"first", bar.first}});
   }
   return object.dump(2) + "\n";
 }
@@ -173,8 +196,11 @@ Result<void> bench_pool(const PoolTimelineOptions& options) {
   if (!scene_result) return scene_result.error();
   Recorder recorder;
   const RemotePoolOptions pool_options{.on_sample = [&](const SampleTrace& trace) { recorder.add(trace); }};
-  auto swarm_result = Swarm::start({.workers = options.workers, .domain = options.domain, .cores = options.cores,
-                                    .pool = pool_options, .stop = options.stop});
+  auto swarm_result = Swarm::start({.workers = options.workers,
+                                    .domain = options.domain,
+                                    .cores = options.cores,
+                                    .pool = pool_options,
+                                    .stop = options.stop});
   if (!swarm_result) return swarm_result.error();
 
   std::vector<std::unique_ptr<Client>> others;
@@ -192,7 +218,8 @@ Result<void> bench_pool(const PoolTimelineOptions& options) {
     batches.push_back(batch_of(static_cast<int>(i), *scene_result, options.workers));
     if (auto loaded = pools[i]->load(*scene_result); !loaded) return loaded.error();
     if (!pools[i]->wait_for_workers(options.workers, std::chrono::steady_clock::now() + kPatience)) {
-      return Error{Code::kUnavailable, fmt::format("client {}: got fewer than {} usable workers", i + 1, options.workers)};
+      return Error{Code::kUnavailable,
+                   fmt::format("client {}: got fewer than {} usable workers", i + 1, options.workers)};
     }
   }
   if (options.urgent) batches.back().priority = physics_pool::Priority::kUrgent;

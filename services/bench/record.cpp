@@ -39,12 +39,12 @@ constexpr const char* kTopic = "/bench/record";
 constexpr const char* kType = "sensor_msgs/msg/JointState";
 // What a writer keeps for readers that are behind: at 20,000 messages per second 0.4 s.
 constexpr dds::Qos kPace{.depth = 8192};
-constexpr int kPositions = 124;     // doubles: the message has 1028 bytes
-constexpr int kVariants = 1024;     // messages made beforehand, sent in turns
+constexpr int kPositions = 124;                // doubles: the message has 1028 bytes
+constexpr int kVariants = 1024;                // messages made beforehand, sent in turns
 constexpr std::chrono::milliseconds kBeat{1};  // of the publisher: what is due goes out in a burst
 constexpr std::chrono::seconds kPatience{30};
 constexpr std::chrono::seconds kVisit{1};  // of a recorder beside a plan
-constexpr double kLoopSeconds = 3.0;  // of the loops beside it
+constexpr double kLoopSeconds = 3.0;       // of the loops beside it
 
 // CDR of joint states whose positions are noise, which does not compress; the stamp has room
 // for a number.
@@ -81,7 +81,8 @@ std::uint64_t number_of(const Bytes& message) {
 
 // Durations of many calls, in microseconds.
 json delays(const std::vector<double>& micros) {
-  return {{"median", quantile(micros, 0.5)}, {"p99", quantile(micros, 0.99)}, {"worst", *std::ranges::max_element(micros)}};
+  return {
+      {"median", quantile(micros, 0.5)}, {"p99", quantile(micros, 0.99)}, {"worst", *std::ranges::max_element(micros)}};
 }
 
 double micros_since(Clock::time_point begin) { return 1e6 * seconds_since(begin); }
@@ -101,7 +102,9 @@ Result<json> loop(Append append) {
     micros.push_back(micros_since(call));
   }
   const double seconds = seconds_since(begin);
-  return json{{"messages", number}, {"per_second", static_cast<double>(number) / seconds}, {"append_us", delays(micros)},
+  return json{{"messages", number},
+              {"per_second", static_cast<double>(number) / seconds},
+              {"append_us", delays(micros)},
               {"cpu_us_per_message", 1e6 * (own_cpu_seconds() - cpu) / static_cast<double>(number)}};
 }
 
@@ -122,7 +125,8 @@ Result<json> bag_loop(const fs::path& folder, bool compress) {
   auto writer_result = bag::BagWriter::create(path, {.compress = compress});
   if (!writer_result) return writer_result.error();
   bag::BagWriter& writer = **writer_result;
-  auto topic_result = writer.add_topic({.name = kTopic, .type = kType, .qos = kPace, .definition = *bag::definition_of(kType)});
+  auto topic_result =
+      writer.add_topic({.name = kTopic, .type = kType, .qos = kPace, .definition = *bag::definition_of(kType)});
   if (!topic_result) return topic_result.error();
   std::uint32_t sequence = 0;
   auto result = loop([&](std::span<const std::byte> message) {
@@ -169,11 +173,11 @@ Result<json> read_json(const fs::path& file) {
 Result<ChildProcess> start_recorder(const fs::path& folder, int domain) {
   std::error_code ignored;
   fs::remove(folder.string() + ".log", ignored);  // of an earlier one, which was ready, too
-  auto process_result = ChildProcess::start(
-      program_folder() / "jostle_record",
-      {"--output", folder.string(), "--json", folder.string() + ".json", "--domain", std::to_string(domain), "--die-with-parent",
-       std::to_string(getpid())},
-      folder.string() + ".log");
+  auto process_result =
+      ChildProcess::start(program_folder() / "jostle_record",
+                          {"--output", folder.string(), "--json", folder.string() + ".json", "--domain",
+                           std::to_string(domain), "--die-with-parent", std::to_string(getpid())},
+                          folder.string() + ".log");
   if (!process_result) return process_result.error();
   ChildProcess recorder = std::move(process_result).value();
   const auto begin = Clock::now();
@@ -189,7 +193,8 @@ Result<void> stop_recorder(ChildProcess& recorder) {
   recorder.terminate();
   const auto ended = recorder.wait_for(kPatience);
   if (ended && *ended == "exit code 0") return {};
-  return Error{Code::kUnavailable, fmt::format("the recorder: {}\n{}", ended.value_or("does not end"), recorder.last_words())};
+  return Error{Code::kUnavailable,
+               fmt::format("the recorder: {}\n{}", ended.value_or("does not end"), recorder.last_words())};
 }
 
 Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) {
@@ -198,8 +203,8 @@ Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) 
   if (!recorder_result) return recorder_result.error();
   auto publisher_result = ChildProcess::start(
       program_folder() / "jostle_bench",
-      {"publish", "--rate", fmt::format("{}", options.rate), "--seconds", fmt::format("{}", options.seconds), "--json", words.string(),
-       "--domain", std::to_string(options.domain)},
+      {"publish", "--rate", fmt::format("{}", options.rate), "--seconds", fmt::format("{}", options.seconds), "--json",
+       words.string(), "--domain", std::to_string(options.domain)},
       folder / "publisher.log");
   if (!publisher_result) return publisher_result.error();
   const auto patience = std::chrono::milliseconds(static_cast<long>(1e3 * options.seconds)) + kPatience;
@@ -209,7 +214,8 @@ Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) 
     if (Clock::now() - begin > patience) return Error{Code::kUnavailable, "the publisher does not end"};
   }
   if (*publisher_result->ended() != "exit code 0") {
-    return Error{Code::kUnavailable, "the publisher: " + *publisher_result->ended() + "\n" + publisher_result->last_words()};
+    return Error{Code::kUnavailable,
+                 "the publisher: " + *publisher_result->ended() + "\n" + publisher_result->last_words()};
   }
   if (auto ok = stop_recorder(*recorder_result); !ok) return ok.error();
   auto published_result = read_json(words), recorded_result = read_json(bag.string() + ".json");
@@ -230,27 +236,27 @@ Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) 
 }
 
 void print_delays(const char* what, const json& delays) {
-  fmt::print("  {:<44} median {:>8.1f} us   99 % {:>9.1f} us   worst {:>9.1f} us\n", what, delays["median"].get<double>(),
-             delays["p99"].get<double>(), delays["worst"].get<double>());
+  fmt::print("  {:<44} median {:>8.1f} us   99 % {:>9.1f} us   worst {:>9.1f} us\n", what,
+             delays["median"].get<double>(), delays["p99"].get<double>(), delays["worst"].get<double>());
 }
 
 void print(const json& all) {
   const json &live = all["pace"], &published = live["publisher"];
   const double seconds = published["seconds"];
-  fmt::print("record: {} messages of 1028 bytes in {:.1f} s, {:.0f}/s\n", published["sent"].get<std::uint64_t>(), seconds,
-             published["sent"].get<double>() / seconds);
-  fmt::print("  recorded {}, lost by its counters {}; in the bag {}, missing by their numbers {}\n", live["recorded"].get<std::uint64_t>(),
-             live["lost_by_counters"].get<std::uint64_t>(), live["read_back"].get<std::uint64_t>(),
-             live["missing_by_numbers"].get<std::uint64_t>());
-  fmt::print("  processor time: publisher {:.2f}, recorder {:.2f} s per s\n", published["cpu_seconds"].get<double>() / seconds,
-             live["recorder_cpu_seconds"].get<double>() / seconds);
+  fmt::print("record: {} messages of 1028 bytes in {:.1f} s, {:.0f}/s\n", published["sent"].get<std::uint64_t>(),
+             seconds, published["sent"].get<double>() / seconds);
+  fmt::print("  recorded {}, lost by its counters {}; in the bag {}, missing by their numbers {}\n",
+             live["recorded"].get<std::uint64_t>(), live["lost_by_counters"].get<std::uint64_t>(),
+             live["read_back"].get<std::uint64_t>(), live["missing_by_numbers"].get<std::uint64_t>());
+  fmt::print("  processor time: publisher {:.2f}, recorder {:.2f} s per s\n",
+             published["cpu_seconds"].get<double>() / seconds, live["recorder_cpu_seconds"].get<double>() / seconds);
   print_delays("the publisher's write()", published["write_us"]);
   print_delays("from write() to the recorder", live["delay_us"]);
   fmt::print("  {:<44} {:>53.1f} us\n", "the recorder's worst write to the bag", live["worst_write_us"].get<double>());
   for (const auto& [name, key] : {std::pair{"bare append loop", "bare_loop"}, std::pair{"bag loop", "bag_loop"},
                                   std::pair{"bag loop, not compressed", "plain_bag_loop"}}) {
-    fmt::print("  {:<26} {:>9.0f}/s, {:.2f} us of processor time per message\n", name, all[key]["per_second"].get<double>(),
-               all[key]["cpu_us_per_message"].get<double>());
+    fmt::print("  {:<26} {:>9.0f}/s, {:.2f} us of processor time per message\n", name,
+               all[key]["per_second"].get<double>(), all[key]["cpu_us_per_message"].get<double>());
     print_delays("   append", all[key]["append_us"]);
   }
 }
@@ -259,19 +265,22 @@ void print(const json& all) {
 double children_cpu_seconds() {
   rusage used{};
   getrusage(RUSAGE_CHILDREN, &used);
-  const auto seconds = [](const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); };
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
   return seconds(used.ru_utime) + seconds(used.ru_stime);
 }
 
 // A plan of several seconds; the value is its time, the hash its own. `meanwhile` is called
 // over and over until the run has ended.
-Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder, const std::function<Result<void>(ChildProcess&)>& meanwhile) {
+Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder,
+                    const std::function<Result<void>(ChildProcess&)>& meanwhile) {
   const fs::path result = folder / "result.json";
-  auto run_result = ChildProcess::start(program_folder() / "jostle_run",
-                                        {(folder / "scene.yaml").string(), "--plan-only", "--seed", "7", "--headless", "--parameters",
-                                         (folder / "parameters.yaml").string(), "--json", result.string(), "--domain",
-                                         std::to_string(options.domain)},
-                                        folder / "run.log");
+  auto run_result = ChildProcess::start(
+      program_folder() / "jostle_run",
+      {(folder / "scene.yaml").string(), "--plan-only", "--seed", "7", "--headless", "--parameters",
+       (folder / "parameters.yaml").string(), "--json", result.string(), "--domain", std::to_string(options.domain)},
+      folder / "run.log");
   if (!run_result) return run_result.error();
   while (!run_result->ended()) {
     if (auto ok = meanwhile(*run_result); !ok) return ok.error();
@@ -282,14 +291,17 @@ Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder, c
   }
   auto report_result = read_json(result);
   if (!report_result) return report_result.error();
-  return Sample{.value = (*report_result)["plan_seconds"], .hash = hash_of((*report_result)["plan_hash"].get<std::string>())};
+  return Sample{.value = (*report_result)["plan_seconds"],
+                .hash = hash_of((*report_result)["plan_hash"].get<std::string>())};
 }
 
 Result<void> disturbance(const RecordBenchOptions& options, const fs::path& folder) {
   auto scene_result = clutter(5);
   if (!scene_result) return scene_result.error();
   if (auto ok = write_text(folder / "scene.yaml", physics_pool::to_yaml(*scene_result)); !ok) return ok;
-  if (auto ok = write_text(folder / "parameters.yaml", "objective: {success_cost: 1.0e-9}\ncontrol: {many_iterations: 4}\n"); !ok) {
+  if (auto ok =
+          write_text(folder / "parameters.yaml", "objective: {success_cost: 1.0e-9}\ncontrol: {many_iterations: 4}\n");
+      !ok) {
     return ok;
   }
   // Comes in the middle, is stopped, and comes again: the middleware of everybody finds and
@@ -379,8 +391,12 @@ int publish_for_record(const RecordBenchOptions& options) {
   }
   const double seconds = seconds_since(begin);
   const bool received = writer.wait_until_received(Clock::now() + kPatience);
-  const json words{{"sent", sent}, {"refused", refused}, {"seconds", seconds}, {"received", received},
-                   {"cpu_seconds", own_cpu_seconds() - cpu}, {"write_us", delays(micros)}};
+  const json words{{"sent", sent},
+                   {"refused", refused},
+                   {"seconds", seconds},
+                   {"received", received},
+                   {"cpu_seconds", own_cpu_seconds() - cpu},
+                   {"write_us", delays(micros)}};
   const auto ok = write_text(options.json, words.dump() + "\n");
   return ok && received ? kExitOk : kExitBroken;
 }

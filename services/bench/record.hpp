@@ -12,7 +12,7 @@ namespace jostle::services {
 struct RecordBenchOptions {
   double rate = 20'000.0;  ///< messages per second, of 1 KiB
   double seconds = 60.0;
-  int pairs = 0;           ///< of plans with and without a recorder; 0: the recorder at its pace
+  int pairs = 0;  ///< of plans with and without a recorder; 0: the recorder at its pace
   int domain = 0;
   std::filesystem::path json;  ///< empty: none
   std::stop_token stop;

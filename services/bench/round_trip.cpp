@@ -95,7 +95,7 @@ constexpr std::size_t kPayloads[] = {kKilo, 64 * kKilo, 1024 * kKilo};  // bytes
 // them in all (net.ipv4.ipfrag_time, ipfrag_high_thresh), and drops every fragment meanwhile.
 // So over a bad link a message of 1 MiB took 13 s, and a stream of 64 KiB stood still.
 constexpr std::size_t kLargestOverBadLinks = 64 * kKilo;  // there and back; of streams 1 KiB
-constexpr int kWindow = 64;  // messages of a stream that are under way
+constexpr int kWindow = 64;                               // messages of a stream that are under way
 
 // A protected and an unprotected domain over the same hosts: a client here, a worker and an
 // echo on host 2 each.
@@ -174,13 +174,17 @@ class Link {
       if (!quality_.perfect() && bytes > kLargestOverBadLinks) continue;
       const msg::Task task = task_of_size(*scene_result, bytes, true);
       const auto ask = [&](Domain& domain) { return there_and_back(domain, task, trips(bytes)); };
-      if (auto ok = add(fmt::format("round-trip/{}", size_name(bytes)), "us", *protected_result, *plain_result, ask); !ok) return ok.error();
+      if (auto ok = add(fmt::format("round-trip/{}", size_name(bytes)), "us", *protected_result, *plain_result, ask);
+          !ok)
+        return ok.error();
     }
     for (const std::size_t bytes : kPayloads) {
       if (!quality_.perfect() && bytes > kKilo) continue;
       const msg::Task task = task_of_size(*scene_result, bytes, false);
       const auto send = [&](Domain& domain) { return flood(domain, task, messages(bytes)); };
-      if (auto ok = add(fmt::format("throughput/{}", size_name(bytes)), "MB/s", *protected_result, *plain_result, send); !ok) return ok.error();
+      if (auto ok = add(fmt::format("throughput/{}", size_name(bytes)), "MB/s", *protected_result, *plain_result, send);
+          !ok)
+        return ok.error();
     }
     return std::move(measurements_);
   }

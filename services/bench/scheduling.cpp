@@ -46,7 +46,8 @@ Result<Measurement> measure_with(int workers, const Settings& settings, const Ho
   batch.wait = kWait;
 
   const auto start = std::chrono::steady_clock::now();
-  auto swarm_result = Swarm::start({.workers = workers, .domain = settings.domain, .hosts = hosts, .stop = settings.stop});
+  auto swarm_result =
+      Swarm::start({.workers = workers, .domain = settings.domain, .hosts = hosts, .stop = settings.stop});
   if (!swarm_result) return swarm_result.error();
   const double gathering = seconds_since(start);
   RemotePool& pool = (*swarm_result)->pool();

@@ -1,8 +1,8 @@
 #include "services/bench/swarm.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
 
@@ -102,11 +102,14 @@ Result<std::unique_ptr<Swarm>> Swarm::start(const SwarmOptions& options) {
   if (!participant_result) return participant_result.error();
   std::unique_ptr<Swarm> swarm(new Swarm(*participant_result, options));
   for (int i = 0; i < options.workers; ++i) {
-    std::vector<std::string> arguments{"--name", fmt::format("worker-{}", i), "--die-with-parent", std::to_string(getpid())};
+    std::vector<std::string> arguments{"--name", fmt::format("worker-{}", i), "--die-with-parent",
+                                       std::to_string(getpid())};
     if (!options.cores.empty()) {
-      arguments.insert(arguments.end(), {"--pin", std::to_string(options.cores[static_cast<std::size_t>(i) % options.cores.size()])});
+      arguments.insert(arguments.end(),
+                       {"--pin", std::to_string(options.cores[static_cast<std::size_t>(i) % options.cores.size()])});
     }
-    if (!options.keystore.empty()) arguments.insert(arguments.end(), {"--secure", options.keystore / "identities" / "worker"});
+    if (!options.keystore.empty())
+      arguments.insert(arguments.end(), {"--secure", options.keystore / "identities" / "worker"});
     Place place{.hosts = options.hosts};
     if (options.hosts) place.host = 2 + i % (options.hosts->count() - 1);
     if (auto ok = swarm->helpers_.start("jostle_worker", arguments, place); !ok) return ok.error();
@@ -126,8 +129,9 @@ Result<void> Swarm::gather(int workers, std::stop_token stop) {
     }
     if (std::chrono::steady_clock::now() < deadline) continue;
     const auto heard = std::ranges::count_if(pool_.status().workers, &physics_pool::WorkerStatus::alive);
-    return Error{Code::kUnavailable, fmt::format("workers: got {} that were heard, wanted {} that could be used, in {} s",
-                                                 heard, workers, kGathering.count())};
+    return Error{Code::kUnavailable,
+                 fmt::format("workers: got {} that were heard, wanted {} that could be used, in {} s", heard, workers,
+                             kGathering.count())};
   }
   return {};
 }

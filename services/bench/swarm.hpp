@@ -83,8 +83,8 @@ class Pinned {
 struct SwarmOptions {
   int workers = 1;
   int domain = 0;
-  std::optional<int> core;  ///< the only one the workers run on, if given
-  std::vector<int> cores;   ///< else: dealt to the workers in turn, each pinned to its own; empty: not pinned
+  std::optional<int> core;         ///< the only one the workers run on, if given
+  std::vector<int> cores;          ///< else: dealt to the workers in turn, each pinned to its own; empty: not pinned
   const Hosts* hosts = nullptr;    ///< workers live on hosts 2, 3, … in turn; null: on this one
   std::filesystem::path keystore;  ///< of a protected domain: we are its `robot`, they its `worker`; else JOSTLE_SECURE
   RemotePoolOptions pool;

@@ -18,14 +18,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kWorkers = 2;            // one per host
-constexpr int kVictim = 3;             // host
+constexpr int kWorkers = 2;  // one per host
+constexpr int kVictim = 3;   // host
 constexpr const char* kThere = "worker-1";
 // As many samples as a plan of Alg. 1 has, waiting instead of simulating: what is measured is
 // how work is handed out, not who else uses this machine's cores.
 constexpr int kIterations = 12;
 constexpr std::uint32_t kSamples = 8;
-constexpr std::chrono::milliseconds kWait{100};  // each; 0.4 s an iteration, 4.8 s in all
+constexpr std::chrono::milliseconds kWait{100};     // each; 0.4 s an iteration, 4.8 s in all
 constexpr std::chrono::milliseconds kBefore{1000};  // from the first result to the unplugging
 // Shorter than silence makes a worker dead (0.5 s), longer, and longer than the
 // middleware's lease (2 s), after which the processes have to find each other again.
@@ -125,7 +125,8 @@ class Outage {
     const auto in = Clock::now();
     hosts_.plug(kVictim, true);
     const auto back = ear_.next(in, true, over);
-    returns_.push_back(back ? std::chrono::duration<double>(*back - in).count() : std::numeric_limits<double>::infinity());
+    returns_.push_back(back ? std::chrono::duration<double>(*back - in).count()
+                            : std::numeric_limits<double>::infinity());
   }
 
   const Hosts& hosts_;
@@ -137,7 +138,9 @@ class Outage {
 
 Result<Measurement> measure_outage(const Hosts& hosts, std::chrono::milliseconds away, const Settings& settings) {
   Ear ear;
-  auto swarm_result = Swarm::start({.workers = kWorkers, .domain = settings.domain, .hosts = &hosts,
+  auto swarm_result = Swarm::start({.workers = kWorkers,
+                                    .domain = settings.domain,
+                                    .hosts = &hosts,
                                     .pool = {.on_sample = [&](const SampleTrace& trace) { ear.hear(trace); }},
                                     .stop = settings.stop});
   if (!swarm_result) return swarm_result.error();
@@ -165,9 +168,10 @@ Result<Measurement> measure_outage(const Hosts& hosts, std::chrono::milliseconds
                      {"capacity_lost_s", floor},
                      {"used_again_after_s", median(returns)},
                      {"used_again_at_worst_s", std::ranges::max(returns)}};
-  settings.on_news(fmt::format("{}; costs {:.2f} s ({:.2f} to {:.2f}), of which {:.2f} s for the workers that were away; "
-                               "used again {:.2f} s after it was plugged in", one_line(*result), median(costs), interval.low,
-                               interval.high, floor, median(returns)));
+  settings.on_news(
+      fmt::format("{}; costs {:.2f} s ({:.2f} to {:.2f}), of which {:.2f} s for the workers that were away; "
+                  "used again {:.2f} s after it was plugged in",
+                  one_line(*result), median(costs), interval.low, interval.high, floor, median(returns)));
   return result;
 }
 

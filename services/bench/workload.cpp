@@ -104,7 +104,8 @@ Sample BareLoops::run(const RolloutBatch& batch) {
   }
   for (std::future<void>& loop : loops) loop.get();
   const double seconds = seconds_since(start);
-  const double steps = static_cast<double>(batch.samples) * batch.nominal.steps() * engine_steps(*simulators_.front(), batch);
+  const double steps =
+      static_cast<double>(batch.samples) * batch.nominal.steps() * engine_steps(*simulators_.front(), batch);
   return {.value = steps / seconds, .hash = hash_of_states(last)};
 }
 

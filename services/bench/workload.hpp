@@ -31,8 +31,7 @@ Hash hash_of_last_states(const physics_pool::BatchReply& reply);
 Hash hash_of_answers(const std::vector<physics_pool::RolloutOutcome>& outcomes);
 
 /// One batch through a pool, in engine steps per second.
-Result<Sample> time_steps(physics_pool::Pool& pool, const physics_pool::RolloutBatch& batch,
-                          std::stop_token stop);
+Result<Sample> time_steps(physics_pool::Pool& pool, const physics_pool::RolloutBatch& batch, std::stop_token stop);
 
 /// The yardstick: threads that do nothing but make a sample's controls, inject
 /// its first state and step the engine. They take the next sample from a counter,

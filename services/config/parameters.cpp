@@ -26,7 +26,8 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("sigma", planner.sigma);
     in.optional("limit", planner.limit);
     in.optional("scales", planner.scales);
-    in.choice<PbstoOptions::Update>("update", planner.update,
+    in.choice<PbstoOptions::Update>(
+        "update", planner.update,
         {{"greedy", PbstoOptions::Update::kGreedy}, {"cost-weighted", PbstoOptions::Update::kCostWeighted}});
     in.optional("lambda", planner.lambda);
     in.optional("persistence", planner.persistence);
@@ -93,35 +94,36 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
   const PbstoOptions& planner = parameters.planner;
   const ControlOptions& control = parameters.control;
   const planners::MpcOptions& mpc = parameters.mpc;
-  for (const Range& range : {Range{"planner.rollouts", double(planner.rollouts), 1, physics_pool::kMaxSamples},
-                             Range{"planner.screening", double(planner.screening), 1, 1e4},
-                             Range{"planner.screening_time_step", planner.screening_time_step, 1e-4, physics_pool::kMaxTimeStep},
-                             Range{"planner.lambda", planner.lambda, 1e-9, 1e12},
-                             Range{"min_steps", double(planner.min_steps), 0, physics_pool::kMaxSteps},
-                             Range{"step_duration", planner.step_duration, 1e-3, physics_pool::kMaxStepDuration},
-                             Range{"control.many_iterations", double(control.many_iterations), 0, 1e6},
-                             Range{"control.few_iterations", double(control.few_iterations), 0, 1e6},
-                             Range{"control.few_iterations_max", double(control.few_iterations_max), 0, 1e6},
-                             Range{"control.obstruction_patience", double(control.obstruction_patience), 0, 1e6},
-                             Range{"control.deviation_threshold", control.deviation_threshold, 0, 1e6},
-                             Range{"control.initial_steps", double(control.initial_steps), 1, physics_pool::kMaxSteps},
-                             Range{"control.straight_speed", control.straight_speed, 0, 1},
-                             Range{"mpc.horizon", double(mpc.horizon), 1, physics_pool::kMaxSteps},
-                             Range{"mpc.first_iterations", double(mpc.first_iterations), 0, 1e6},
-                             Range{"mpc.iterations", double(mpc.iterations), 0, 1e6},
-                             Range{"mpc.max_actions", double(mpc.max_actions), 1, 1e6},
-                             Range{"mpc.straight_speed", mpc.straight_speed, 0, 1},
-                             Range{"control.timeout", timeout, 1, 1e6}}) {
+  for (const Range& range :
+       {Range{"planner.rollouts", double(planner.rollouts), 1, physics_pool::kMaxSamples},
+        Range{"planner.screening", double(planner.screening), 1, 1e4},
+        Range{"planner.screening_time_step", planner.screening_time_step, 1e-4, physics_pool::kMaxTimeStep},
+        Range{"planner.lambda", planner.lambda, 1e-9, 1e12},
+        Range{"min_steps", double(planner.min_steps), 0, physics_pool::kMaxSteps},
+        Range{"step_duration", planner.step_duration, 1e-3, physics_pool::kMaxStepDuration},
+        Range{"control.many_iterations", double(control.many_iterations), 0, 1e6},
+        Range{"control.few_iterations", double(control.few_iterations), 0, 1e6},
+        Range{"control.few_iterations_max", double(control.few_iterations_max), 0, 1e6},
+        Range{"control.obstruction_patience", double(control.obstruction_patience), 0, 1e6},
+        Range{"control.deviation_threshold", control.deviation_threshold, 0, 1e6},
+        Range{"control.initial_steps", double(control.initial_steps), 1, physics_pool::kMaxSteps},
+        Range{"control.straight_speed", control.straight_speed, 0, 1},
+        Range{"mpc.horizon", double(mpc.horizon), 1, physics_pool::kMaxSteps},
+        Range{"mpc.first_iterations", double(mpc.first_iterations), 0, 1e6},
+        Range{"mpc.iterations", double(mpc.iterations), 0, 1e6},
+        Range{"mpc.max_actions", double(mpc.max_actions), 1, 1e6},
+        Range{"mpc.straight_speed", mpc.straight_speed, 0, 1}, Range{"control.timeout", timeout, 1, 1e6}}) {
     if (range.value >= range.low && range.value <= range.high) continue;  // false for NaN
-    return Error{Code::kInvalidArgument, fmt::format("{}: {}: got {}, wanted {} to {}", origin, range.key,
-                                                     range.value, range.low, range.high)};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: {}: got {}, wanted {} to {}", origin, range.key, range.value, range.low, range.high)};
   }
   for (const auto& [key, values] : {std::pair{"sigma", &planner.sigma}, std::pair{"limit", &planner.limit}}) {
     const std::size_t axes = values->size();
     if (axes == planner.sigma.size() && (axes == kGripperAxes || axes == kPusherAxes)) continue;
     return Error{Code::kInvalidArgument,
                  fmt::format("{}: planner.{}: got {} numbers, wanted {} for a gripper or {} for a pusher, of sigma "
-                             "and limit alike", origin, key, axes, int{kGripperAxes}, int{kPusherAxes})};
+                             "and limit alike",
+                             origin, key, axes, int{kGripperAxes}, int{kPusherAxes})};
   }
   if (double(planner.rollouts) * planner.screening > physics_pool::kMaxSamples) {
     return Error{Code::kInvalidArgument,
@@ -132,7 +134,8 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
   if (planner.screening > 1 && std::abs(steps - std::round(steps)) > 1e-6 * steps) {
     return Error{Code::kInvalidArgument,
                  fmt::format("{}: planner.screening_time_step: got {} s, wanted a part of step_duration, {} s, "
-                             "without remainder", origin, planner.screening_time_step, planner.step_duration)};
+                             "without remainder",
+                             origin, planner.screening_time_step, planner.step_duration)};
   }
   return {};
 }

@@ -16,7 +16,8 @@ namespace {
 Error unknown(const std::string& text) {
   return {Code::kInvalidArgument,
           fmt::format("predictor: got '{}', wanted fine, coarse[,MODEL], parareal:K[,MODEL][,split] or "
-                      "parareal:adaptive[,MODEL][,split]", text)};
+                      "parareal:adaptive[,MODEL][,split]",
+                      text)};
 }
 
 std::vector<std::string> words_of(const std::string& text) {

@@ -22,10 +22,14 @@ constexpr std::size_t kGoalQueue = 8;
 
 const char* word(planners::Phase phase) {
   switch (phase) {
-    case planners::Phase::kPlanning: return "planning";
-    case planners::Phase::kActing: return "acting";
-    case planners::Phase::kClosing: return "closing";
-    case planners::Phase::kDone: return "done";
+    case planners::Phase::kPlanning:
+      return "planning";
+    case planners::Phase::kActing:
+      return "acting";
+    case planners::Phase::kClosing:
+      return "closing";
+    case planners::Phase::kDone:
+      return "done";
   }
   return "";
 }
@@ -112,7 +116,8 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
     feedback_.goal_id(goal_id_);
     feedback_.phase("preparing");
   }
-  spdlog::info("goal {}: controller {}, predictor {}, seed {}", goal.goal_id(), goal.controller(), goal.predictor(), goal.seed());
+  spdlog::info("goal {}: controller {}, predictor {}, seed {}", goal.goal_id(), goal.controller(), goal.predictor(),
+               goal.seed());
   // A stop of the process cancels the task.
   const std::stop_callback forward(stop, [this] {
     const std::lock_guard lock(mutex_);
@@ -124,8 +129,8 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   {
     const std::jthread refuser([this](std::stop_token own) { refuse_goals_meanwhile(own); });
     auto task_result = Task::prepare(goal, pool_, [](const std::string& why) { spdlog::info("split: {}", why); });
-    auto outcome_result = task_result ? perform(goal, *task_result, cancelled)
-                                      : Result<planners::Outcome>(task_result.error());
+    auto outcome_result =
+        task_result ? perform(goal, *task_result, cancelled) : Result<planners::Outcome>(task_result.error());
     if (outcome_result) {
       result.success(outcome_result->success);
       result.reason(outcome_result->reason);
@@ -153,7 +158,8 @@ Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task, std
   const Task::Watch watch{
       .on_event = [&](const planners::ControlEvent& event) { note(event, geometry); },
       .on_progress = [&](const planners::Progress& progress) { note(progress, geometry); },
-      .journal = {.on_observation = [this](const jostle_msgs::msg::Observation& seen) { observation_writer_.write(seen); },
+      .journal = {.on_observation =
+                      [this](const jostle_msgs::msg::Observation& seen) { observation_writer_.write(seen); },
                   .on_plan = [this](const jostle_msgs::msg::Plan& plan) { plan_writer_.write(plan); }},
       .time = [&] { return robot.time(); }};
   return task.perform(robot, objects, watch, std::move(stop));

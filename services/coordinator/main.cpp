@@ -13,15 +13,16 @@
 int main(int argc, char** argv) {
   using namespace jostle;
   using namespace jostle::services;
-  CLI::App app("Accepts a task, plans it with a pool of workers, executes it and reports.",
-               "jostle coordinator");
+  CLI::App app("Accepts a task, plans it with a pool of workers, executes it and reports.", "jostle coordinator");
   std::string pool_kind = "dds";
   int threads = usable_cores();
   dds::ParticipantOptions participant_options{.name = "jostle_coordinator"};
   ProcessOptions process;
   app.add_option("--pool", pool_kind, "dds: worker processes; threads: in this process")
-      ->capture_default_str()->check(CLI::IsMember({"dds", "threads"}));
-  add_count_option(app, "--threads", threads, 1, "Of the pool of threads; auto: one per core this process may use")->default_str("auto");
+      ->capture_default_str()
+      ->check(CLI::IsMember({"dds", "threads"}));
+  add_count_option(app, "--threads", threads, 1, "Of the pool of threads; auto: one per core this process may use")
+      ->default_str("auto");
   add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   die_with_parent(process.parent);

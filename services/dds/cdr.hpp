@@ -27,7 +27,8 @@ Result<T> from_cdr(std::span<const std::byte> data) {
     message.deserialize(cdr);
     return message;
   } catch (const std::exception& error) {
-    return Error{Code::kInvalidArgument, fmt::format("{} bytes are not the message they should be: {}", data.size(), error.what())};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{} bytes are not the message they should be: {}", data.size(), error.what())};
   }
 }
 

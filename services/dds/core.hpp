@@ -37,8 +37,7 @@ class Participant::Core {
 
   /// A topic that is shared by all its writers and readers here; give it back.
   /// Throws SetupError.
-  eprosima::fastdds::dds::Topic* acquire_topic(const std::string& name,
-                                               eprosima::fastdds::dds::TypeSupport type);
+  eprosima::fastdds::dds::Topic* acquire_topic(const std::string& name, eprosima::fastdds::dds::TypeSupport type);
   void release_topic(eprosima::fastdds::dds::Topic* topic);
 
   eprosima::fastdds::dds::DomainParticipant* const participant;
@@ -137,8 +136,7 @@ void apply(const Qos& qos, EndpointQos& endpoint) {
     endpoint.resource_limits().max_samples_per_instance = kMostKept;
     endpoint.resource_limits().max_samples = 0;  // no limit of their sum
   }
-  endpoint.endpoint().history_memory_policy =
-      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  endpoint.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   endpoint.data_sharing().off();
 }
 

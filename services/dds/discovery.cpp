@@ -13,8 +13,9 @@ namespace jostle::dds {
 namespace {
 
 Error malformed(const std::string& text, const std::string& why) {
-  return {Code::kInvalidArgument,
-          fmt::format("discovery: got '{}', wanted multicast, peers:HOST[,HOST...] or server:HOST[:PORT]: {}", text, why)};
+  return {
+      Code::kInvalidArgument,
+      fmt::format("discovery: got '{}', wanted multicast, peers:HOST[,HOST...] or server:HOST[:PORT]: {}", text, why)};
 }
 
 }  // namespace
@@ -24,7 +25,8 @@ Result<std::string> resolve(const std::string& host) {
   addrinfo* found = nullptr;
   if (const int code = getaddrinfo(host.c_str(), nullptr, &hints, &found); code != 0) {
     return Error{Code::kNotFound, fmt::format("host '{}': {}; wanted an IPv4 address or a name that "
-                                              "resolves to one", host, gai_strerror(code))};
+                                              "resolves to one",
+                                              host, gai_strerror(code))};
   }
   char text[INET_ADDRSTRLEN] = "";
   inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(found->ai_addr)->sin_addr, text, sizeof text);

@@ -22,8 +22,8 @@ struct Endpoint {
   Guid guid{};
   std::string topic, type;  ///< as on the wire; names.hpp turns them into those of ROS 2
   bool keyed = false;
-  bool reliable = false;    ///< offered by a writer, asked for by a reader
-  bool latched = false;     ///< transient-local or more, likewise
+  bool reliable = false;  ///< offered by a writer, asked for by a reader
+  bool latched = false;   ///< transient-local or more, likewise
 };
 
 /// Hears of every endpoint of the domain as it comes and goes. Give it to

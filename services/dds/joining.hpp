@@ -24,7 +24,8 @@ struct Joined {
 /// and never answers the other's requests, which come each second (4 of 202 groups of four on two
 /// cores had such a pair). Only somebody new is answered: who still waits after kPatience joins
 /// again, once. A stranger who never answers costs every start as much, and gets nothing.
-Joined join(int domain, const eprosima::fastdds::dds::DomainParticipantQos& qos, const std::shared_ptr<EndpointWatch>& watch);
+Joined join(int domain, const eprosima::fastdds::dds::DomainParticipantQos& qos,
+            const std::shared_ptr<EndpointWatch>& watch);
 
 /// Those who are there answer a newcomer within some milliseconds.
 inline constexpr std::chrono::milliseconds kHail{200};

@@ -5,15 +5,15 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <fastdds/rtps/attributes/ServerAttributes.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/rtps/attributes/ServerAttributes.h>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
 #include <typeinfo>
 
 #include "idl/types/hash.hpp"
@@ -66,9 +66,11 @@ Result<DomainParticipantQos> make_qos(const std::string& name) {
   } else if (factory->get_participant_qos_from_profile(profile, qos) != ReturnCode_t::RETCODE_OK) {
     const auto built_in = built_in_participant(profile);
     if (!built_in) {
-      return Error{Code::kInvalidArgument,
-                   fmt::format("JOSTLE_DDS_TRANSPORT: got '{}', wanted udp, shared_memory, default or a participant profile of '{}'",
-                               profile, profiles_file().path.string())};
+      return Error{
+          Code::kInvalidArgument,
+          fmt::format(
+              "JOSTLE_DDS_TRANSPORT: got '{}', wanted udp, shared_memory, default or a participant profile of '{}'",
+              profile, profiles_file().path.string())};
     }
     qos = *built_in;
   }
@@ -121,8 +123,9 @@ std::string why_taken(const std::string& address, std::uint16_t port, bool share
 Result<void> check_address(const ServerOptions& server) {
   const std::string problem = why_taken(server.address, server.port, false);
   if (problem.empty()) return {};
-  return Error{Code::kUnavailable, fmt::format("{}:{}: {}; wanted an address of this host (`ip address`) and a free port",
-                                               server.address, server.port, problem)};
+  return Error{Code::kUnavailable,
+               fmt::format("{}:{}: {}; wanted an address of this host (`ip address`) and a free port", server.address,
+                           server.port, problem)};
 }
 
 // Likewise a participant that hears nobody come.
@@ -130,10 +133,12 @@ Result<void> check_multicast_port(int domain, const DomainParticipantQos& qos) {
   const std::uint32_t port = qos.wire_protocol().port.getMulticastPort(static_cast<std::uint32_t>(domain));
   const std::string problem = why_taken("0.0.0.0", static_cast<std::uint16_t>(port), true);
   if (problem.empty()) return {};
-  return Error{Code::kUnavailable,
-               fmt::format("DDS domain {}: another program has its UDP port of discovery, {}: {}; wanted it free: end that program "
-                           "(`ss -ulpn`), or choose a ROS_DOMAIN_ID whose ports nobody is given, 0 to 100",
-                           domain, port, problem)};
+  return Error{
+      Code::kUnavailable,
+      fmt::format(
+          "DDS domain {}: another program has its UDP port of discovery, {}: {}; wanted it free: end that program "
+          "(`ss -ulpn`), or choose a ROS_DOMAIN_ID whose ports nobody is given, 0 to 100",
+          domain, port, problem)};
 }
 
 void serve(const ServerOptions& server, DomainParticipantQos& qos) {
@@ -207,7 +212,8 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
   DomainParticipantQos& qos = *qos_result;
   const auto space_result = parse_namespace(environment("JOSTLE_NAMESPACE"));
   if (!space_result) return space_result.error();
-  const std::string way = environment("JOSTLE_DISCOVERY"), identity = options.identity.value_or(environment("JOSTLE_SECURE"));
+  const std::string way = environment("JOSTLE_DISCOVERY"),
+                    identity = options.identity.value_or(environment("JOSTLE_SECURE"));
   auto discovery_result = parse_discovery(way.empty() || server ? "multicast" : way);
   if (!discovery_result) return discovery_result.error();
   find_by(*discovery_result, qos);
@@ -220,16 +226,17 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
   }
   if (!identity.empty()) {
     if (server || discovery_result->mode == Discovery::Mode::kServer) {
-      return Error{Code::kInvalidArgument, "a discovery server on a protected domain: the middleware has none that works; "
-                                           "wanted --discovery multicast or peers:HOST,..., or no --secure (JOSTLE_SECURE)"};
+      return Error{Code::kInvalidArgument,
+                   "a discovery server on a protected domain: the middleware has none that works; "
+                   "wanted --discovery multicast or peers:HOST,..., or no --secure (JOSTLE_SECURE)"};
     }
     if (auto ok = secure(qos, identity); !ok) return ok.error();
   }
   Joined joined = join(*domain_result, qos, options.watch);
   if (!joined.participant) {
-    return Error{Code::kUnavailable,
-                 fmt::format("DDS domain {}: no participant could be created; check the network "
-                             "interfaces, /dev/shm and the profiles in '{}'", *domain_result, profiles_file().path.string())};
+    return Error{Code::kUnavailable, fmt::format("DDS domain {}: no participant could be created; check the network "
+                                                 "interfaces, /dev/shm and the profiles in '{}'",
+                                                 *domain_result, profiles_file().path.string())};
   }
   return Participant(std::make_shared<Core>(std::move(joined), *domain_result, *space_result));
 }
@@ -265,21 +272,19 @@ Participant::Core::~Core() {
   DomainParticipantFactory::get_instance()->delete_participant(participant);
 }
 
-eprosima::fastdds::dds::Topic* Participant::Core::acquire_topic(
-    const std::string& name, eprosima::fastdds::dds::TypeSupport type) {
+eprosima::fastdds::dds::Topic* Participant::Core::acquire_topic(const std::string& name,
+                                                                eprosima::fastdds::dds::TypeSupport type) {
   const std::lock_guard lock(mutex_);
   auto* topic = static_cast<eprosima::fastdds::dds::Topic*>(participant->lookup_topicdescription(name));
   if (!topic) {
     type.register_type(participant);
-    topic = participant->create_topic(name, type.get_type_name(),
-                                      eprosima::fastdds::dds::TOPIC_QOS_DEFAULT);
+    topic = participant->create_topic(name, type.get_type_name(), eprosima::fastdds::dds::TOPIC_QOS_DEFAULT);
   }
   // The middleware would use the first of two serializers of one name for both.
   const auto serializer = participant->find_type(type.get_type_name());
   const bool ours = !serializer.empty() && typeid(*serializer.get()) == typeid(*type.get());
   if (!topic || topic->get_type_name() != type.get_type_name() || !ours) {
-    throw SetupError(fmt::format("topic {}: the middleware refused it with type {}", name,
-                                 type.get_type_name()));
+    throw SetupError(fmt::format("topic {}: the middleware refused it with type {}", name, type.get_type_name()));
   }
   ++users_[name];
   return topic;

@@ -24,17 +24,17 @@ struct SetupError : std::runtime_error {
 };
 
 struct ParticipantOptions {
-  std::string name = "jostle";  ///< as tools list it
-  std::optional<int> domain;    ///< 0 to 232; else ROS_DOMAIN_ID, else 0
+  std::string name = "jostle";           ///< as tools list it
+  std::optional<int> domain;             ///< 0 to 232; else ROS_DOMAIN_ID, else 0
   std::shared_ptr<EndpointWatch> watch;  ///< hears of all others from the first moment; may be empty
-  std::optional<std::string> identity;  ///< folder; empty: unprotected; else JOSTLE_SECURE
+  std::optional<std::string> identity;   ///< folder; empty: unprotected; else JOSTLE_SECURE
 };
 
 /// A discovery server: listens there, introduces participants to each other.
 struct ServerOptions {
   std::string address = "0.0.0.0";  ///< IPv4 to listen at; 0.0.0.0: all of this host
   std::uint16_t port = kServerPort;
-  int id = 0;                       ///< its place in the list of servers that clients are given
+  int id = 0;  ///< its place in the list of servers that clients are given
 };
 
 /// One per process: two can deadlock at shutdown (Fast DDS #6193). A copy is

@@ -83,7 +83,8 @@ std::string got_in(const XMLElement& place) {
   return place.NoChildren() ? "nothing" : fmt::format("'{}'", text_of(place));
 }
 
-Error wrong(const std::filesystem::path& file, const XMLElement& place, const std::string& got, const std::string& wanted) {
+Error wrong(const std::filesystem::path& file, const XMLElement& place, const std::string& got,
+            const std::string& wanted) {
   return {Code::kInvalidArgument,
           fmt::format("{}:{}: <{}>: got {}, wanted {}", file.string(), place.GetLineNum(), place.Name(), got, wanted)};
 }
@@ -129,7 +130,8 @@ std::string words_for(const XMLElement& place) {
   return known == kWords.end() ? "" : known->second;
 }
 
-Error refusal(const std::filesystem::path& file, XMLDocument& document, const std::string& why, Complaints& complaints) {
+Error refusal(const std::filesystem::path& file, XMLDocument& document, const std::string& why,
+              Complaints& complaints) {
   const XMLElement& place = at_fault(document, why, complaints);
   std::string wanted = words_for(place);
   if (wanted.empty() && why.find("getXMLInt") != std::string::npos) wanted = kNumber;
@@ -141,8 +143,15 @@ Error refusal(const std::filesystem::path& file, XMLDocument& document, const st
 
 // Numbers of which it reads as much as it can: 4 of "4 MiB".
 Result<void> check_numbers(const std::filesystem::path& file, const XMLElement& place) {
-  static const std::set<std::string> kNumbers{"depth", "max_samples", "max_instances", "max_samples_per_instance", "allocated_samples",
-                                              "sendBufferSize", "receiveBufferSize", "maxInitialPeersRange", "segment_size"};
+  static const std::set<std::string> kNumbers{"depth",
+                                              "max_samples",
+                                              "max_instances",
+                                              "max_samples_per_instance",
+                                              "allocated_samples",
+                                              "sendBufferSize",
+                                              "receiveBufferSize",
+                                              "maxInitialPeersRange",
+                                              "segment_size"};
   if (kNumbers.contains(place.Name()) && text_of(place).find_first_not_of("0123456789") != std::string::npos) {
     return wrong(file, place, got_in(place), kNumber);
   }
@@ -174,11 +183,13 @@ bool is_asked_for(const std::string& name) {
 Result<void> check_names(const ProfilesFile& file, const XMLDocument& document) {
   std::set<std::pair<std::string, std::string>> seen;
   const XMLElement* profiles = profiles_in(document);
-  for (const XMLElement* one = profiles ? profiles->FirstChildElement() : nullptr; one; one = one->NextSiblingElement()) {
+  for (const XMLElement* one = profiles ? profiles->FirstChildElement() : nullptr; one;
+       one = one->NextSiblingElement()) {
     const std::string side = side_of(*one), name = name_of(*one);
     if (side.empty() && std::string_view(one->Name()) != "participant") continue;
     if (name.empty()) return wrong(file.path, *one, "no name", "profile_name=\"...\"");
-    if (!seen.emplace(side, name).second) return wrong(file.path, *one, fmt::format("'{}' again", name), "each name once");
+    if (!seen.emplace(side, name).second)
+      return wrong(file.path, *one, fmt::format("'{}' again", name), "each name once");
     if (side.empty() || file.shared || is_asked_for(name)) continue;
     std::vector<std::string> kinds;
     for (const Qos& kind : kKinds) kinds.emplace_back(kind.kind);
@@ -227,10 +238,12 @@ Result<void> check_promises(const std::filesystem::path& file, const XMLDocument
   if (asked.depth < 1) return problem("data_reader", fmt::format("depth {}", asked.depth), "at least 1");
   const char* changed = asks ? "data_reader" : "data_writer";
   if (asked.reliable && !offered.reliable) {
-    return problem(changed, "readers RELIABLE and writers BEST_EFFORT", "no more from readers than writers offer: they would never meet");
+    return problem(changed, "readers RELIABLE and writers BEST_EFFORT",
+                   "no more from readers than writers offer: they would never meet");
   }
   if (asked.latched && !offered.latched) {
-    return problem(changed, "readers TRANSIENT_LOCAL and writers VOLATILE", "no more from readers than writers offer: they would never meet");
+    return problem(changed, "readers TRANSIENT_LOCAL and writers VOLATILE",
+                   "no more from readers than writers offer: they would never meet");
   }
   return {};
 }
@@ -239,7 +252,8 @@ Result<void> check_promises(const std::filesystem::path& file, const XMLDocument
 
 ProfilesFile profiles_file() {
   if (const char* file = std::getenv("JOSTLE_PROFILES"); file && *file) return {.path = file};
-  if (const char* file = std::getenv("FASTRTPS_DEFAULT_PROFILES_FILE"); file && *file) return {.path = file, .shared = true};
+  if (const char* file = std::getenv("FASTRTPS_DEFAULT_PROFILES_FILE"); file && *file)
+    return {.path = file, .shared = true};
   const std::filesystem::path installed = services::data_file("profiles.xml");
   std::error_code ignored;
   return {.path = std::filesystem::exists(installed, ignored) ? installed : std::filesystem::path()};
@@ -251,21 +265,24 @@ Result<void> load_profiles(const ProfilesFile& file) {
   XMLDocument document;
   if (const auto problem = document.LoadFile(file.path.c_str()); problem != tinyxml2::XML_SUCCESS) {
     using namespace tinyxml2;
-    if (problem == XML_ERROR_FILE_NOT_FOUND || problem == XML_ERROR_FILE_COULD_NOT_BE_OPENED || problem == XML_ERROR_FILE_READ_ERROR) {
+    if (problem == XML_ERROR_FILE_NOT_FOUND || problem == XML_ERROR_FILE_COULD_NOT_BE_OPENED ||
+        problem == XML_ERROR_FILE_READ_ERROR) {
       return Error{Code::kIo, fmt::format("{}: cannot be read; wanted a file of profiles", file.path.string())};
     }
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}:{}: got {}, wanted well-formed XML", file.path.string(), document.ErrorLineNum(), document.ErrorName())};
+    return Error{Code::kInvalidArgument, fmt::format("{}:{}: got {}, wanted well-formed XML", file.path.string(),
+                                                     document.ErrorLineNum(), document.ErrorName())};
   }
-  if (!document.RootElement()) return Error{Code::kInvalidArgument, fmt::format("{}: got no element, wanted <dds>", file.path.string())};
+  if (!document.RootElement())
+    return Error{Code::kInvalidArgument, fmt::format("{}: got no element, wanted <dds>", file.path.string())};
   Complaints complaints;
-  if (const auto why = complaint_about(document, complaints); !why.empty()) return refusal(file.path, document, why, complaints);
+  if (const auto why = complaint_about(document, complaints); !why.empty())
+    return refusal(file.path, document, why, complaints);
   if (auto ok = check_numbers(file.path, *document.RootElement()); !ok) return ok;
   if (auto ok = check_names(file, document); !ok) return ok;
   XMLProfileManager::DeleteInstance();
   if (XMLProfileManager::loadXMLNode(document) != XMLP_ret::XML_OK) {
-    return Error{Code::kInvalidArgument, fmt::format("{}: got a file that Fast DDS refuses, wanted profiles: {}", file.path.string(),
-                                                     complaints.first())};
+    return Error{Code::kInvalidArgument, fmt::format("{}: got a file that Fast DDS refuses, wanted profiles: {}",
+                                                     file.path.string(), complaints.first())};
   }
   for (const Qos& kind : kKinds) {
     if (auto ok = check_promises(file.path, document, kind); !ok) return ok;

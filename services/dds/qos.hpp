@@ -20,8 +20,8 @@ struct Qos {
   /// The writer keeps its last samples for late readers that ask, as recorders do; the
   /// system's own readers of the topic do not.
   bool retained = false;
-  int depth = 10;        ///< samples kept per instance (keep-last)
-  int instances = 1;     ///< most keys of a keyed type; the middleware's default is 10
+  int depth = 10;         ///< samples kept per instance (keep-last)
+  int instances = 1;      ///< most keys of a keyed type; the middleware's default is 10
   std::string_view kind;  ///< its profile's name in the file; empty: the file does not matter
 
   /// Whether the promises are equal, by whatever name.

@@ -73,13 +73,14 @@ struct ReaderBase::Impl : DataReaderListener {
   bool closed = false;
 };
 
-ReaderBase::ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos,
-                       TypeSupport type, std::function<void(const void*, const Origin&)> on_sample)
+ReaderBase::ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos, TypeSupport type,
+                       std::function<void(const void*, const Origin&)> on_sample)
     : impl_(std::make_unique<Impl>(participant, type, std::move(on_sample))) {
   Participant::Core& core = participant.core();
   impl_->topic = core.acquire_topic(topic, type);
-  impl_->reader = core.subscriber->create_datareader(impl_->topic, reader_qos(core, topic, qos), impl_.get(),
-                                                     StatusMask::data_available() << StatusMask::subscription_matched());
+  impl_->reader =
+      core.subscriber->create_datareader(impl_->topic, reader_qos(core, topic, qos), impl_.get(),
+                                         StatusMask::data_available() << StatusMask::subscription_matched());
   if (impl_->reader) return;
   core.release_topic(impl_->topic);
   throw SetupError("topic " + topic + ": the middleware refused a reader; profiles: " + profiles_file().path.string());

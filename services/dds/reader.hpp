@@ -23,8 +23,8 @@ namespace jostle::dds {
 struct Origin {
   std::uint64_t participant = 0;  ///< Participant::id() of who wrote it
   Guid writer{};
-  std::uint64_t sequence = 0;     ///< of the writer, counting from 1: a gap is a lost sample
-  std::int64_t source_time = 0;   ///< when it was written, ns since the Unix epoch, on the writer's clock
+  std::uint64_t sequence = 0;    ///< of the writer, counting from 1: a gap is a lost sample
+  std::int64_t source_time = 0;  ///< when it was written, ns since the Unix epoch, on the writer's clock
 };
 
 /// What did not reach a reader, so far.
@@ -74,9 +74,8 @@ class Reader : public ReaderBase {
   using OnSampleOf = std::function<void(const T&, const Origin&)>;
 
   Reader(const Participant& participant, const Topic<T>& topic, OnSample on_sample)
-      : Reader(participant, topic, OnSampleOf([on_sample = std::move(on_sample)](const T& sample, const Origin&) {
-                 on_sample(sample);
-               })) {}
+      : Reader(participant, topic,
+               OnSampleOf([on_sample = std::move(on_sample)](const T& sample, const Origin&) { on_sample(sample); })) {}
 
   Reader(const Participant& participant, const Topic<T>& topic, OnSampleOf on_sample)
       : ReaderBase(participant, participant.wire_name(topic.name, topic.scope), topic.qos,

@@ -14,8 +14,8 @@ SystemTopic describe(const Topic<T>& topic) {
 }  // namespace
 
 const std::vector<SystemTopic>& system_topics() {
-  static const std::vector<SystemTopic> table = std::apply(
-      [](const auto&... topic) { return std::vector{describe(topic)...}; }, topics::all());
+  static const std::vector<SystemTopic> table =
+      std::apply([](const auto&... topic) { return std::vector{describe(topic)...}; }, topics::all());
   return table;
 }
 

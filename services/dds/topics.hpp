@@ -43,9 +43,9 @@ inline const Topic<rosgraph_msgs::msg::Clock> kClock{"rt/clock", dds::kState, dd
 
 /// All of the above, in their order.
 inline auto all() {
-  return std::tie(kJointStates, kTransforms, kObjectPoses, kObjectStates, kRobotCommand, kRobotStatus, kTaskGoal, kTaskCancel,
-                  kTaskRun, kTaskObservation, kTaskPlan, kTaskFeedback, kTaskResult, kPoolWorker, kPoolWorld, kPoolControl,
-                  kPoolResult, kPlayControl, kPlayStatus, kClock);
+  return std::tie(kJointStates, kTransforms, kObjectPoses, kObjectStates, kRobotCommand, kRobotStatus, kTaskGoal,
+                  kTaskCancel, kTaskRun, kTaskObservation, kTaskPlan, kTaskFeedback, kTaskResult, kPoolWorker,
+                  kPoolWorld, kPoolControl, kPoolResult, kPlayControl, kPlayStatus, kClock);
 }
 
 /// Each worker reads its own: one sample per task on a shared topic would reach

@@ -16,10 +16,10 @@ namespace jostle::dds {
 template <class T>
 struct SerializerOf;
 
-#define JOSTLE_WIRE_TYPE(package, name)                \
-  template <>                                          \
-  struct SerializerOf<package::msg::name> {            \
-    using type = package::msg::name##PubSubType;       \
+#define JOSTLE_WIRE_TYPE(package, name)          \
+  template <>                                    \
+  struct SerializerOf<package::msg::name> {      \
+    using type = package::msg::name##PubSubType; \
   };
 
 JOSTLE_WIRE_TYPE(geometry_msgs, PoseArray)

@@ -46,8 +46,7 @@ struct WriterBase::Impl : DataWriterListener {
   Peers readers;
 };
 
-WriterBase::WriterBase(const Participant& participant, const std::string& topic, const Qos& qos,
-                       TypeSupport type)
+WriterBase::WriterBase(const Participant& participant, const std::string& topic, const Qos& qos, TypeSupport type)
     : impl_(std::make_unique<Impl>(participant)) {
   Participant::Core& core = participant.core();
   impl_->topic = core.acquire_topic(topic, type);

@@ -10,16 +10,19 @@
 int main(int argc, char** argv) {
   using namespace jostle;
   using namespace jostle::services;
-  CLI::App app("Introduces processes to each other on networks without multicast; carries none of their data.\n"
-               "Give every other program --discovery server:HOST[:PORT]. Runs until it is told to end.",
-               "jostle discovery-server");
+  CLI::App app(
+      "Introduces processes to each other on networks without multicast; carries none of their data.\n"
+      "Give every other program --discovery server:HOST[:PORT]. Runs until it is told to end.",
+      "jostle discovery-server");
   dds::ServerOptions server;
   ProcessOptions process;
   app.add_option("--listen", server.address, "IPv4 address of this host; 0.0.0.0: all of them")
-      ->capture_default_str()->check(CLI::ValidIPV4);
+      ->capture_default_str()
+      ->check(CLI::ValidIPV4);
   app.add_option("--port", server.port, "UDP port")->capture_default_str()->check(CLI::Range(1, 65535));
   app.add_option("--id", server.id, "Its place, from 0, in the list of servers that the others are given")
-      ->capture_default_str()->check(CLI::Range(0, 255));
+      ->capture_default_str()
+      ->check(CLI::Range(0, 255));
   add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   die_with_parent(process.parent);

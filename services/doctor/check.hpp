@@ -15,15 +15,18 @@ enum class Verdict {
 /// "ok", "warn" or "FAIL".
 inline const char* word(Verdict verdict) {
   switch (verdict) {
-    case Verdict::kOk: return "ok";
-    case Verdict::kWarn: return "warn";
-    case Verdict::kFail: break;
+    case Verdict::kOk:
+      return "ok";
+    case Verdict::kWarn:
+      return "warn";
+    case Verdict::kFail:
+      break;
   }
   return "FAIL";
 }
 
 struct Check {
-  std::string name;     ///< what was looked at
+  std::string name;  ///< what was looked at
   Verdict verdict = Verdict::kOk;
   std::string finding;  ///< what was found, with numbers
   std::string remedy;   ///< what to do; empty if ok

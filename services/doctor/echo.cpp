@@ -42,7 +42,8 @@ bool Caller::meet(dds::TimePoint deadline) {
 }
 
 void Caller::settle(dds::TimePoint deadline) {
-  while (Clock::now() < deadline && !call(1, Clock::now() + kAnswer)) {}
+  while (Clock::now() < deadline && !call(1, Clock::now() + kAnswer)) {
+  }
 }
 
 std::optional<std::chrono::nanoseconds> Caller::call(std::size_t bytes, dds::TimePoint deadline) {
@@ -52,7 +53,8 @@ std::optional<std::chrono::nanoseconds> Caller::call(std::size_t bytes, dds::Tim
   const auto start = Clock::now();
   there_.write(goal);
   while (const auto answer = back_.take(deadline)) {
-    if (answer->goal_id() == goal.goal_id() && answer->execution_scene() == goal.execution_scene()) return Clock::now() - start;
+    if (answer->goal_id() == goal.goal_id() && answer->execution_scene() == goal.execution_scene())
+      return Clock::now() - start;
   }
   return {};
 }

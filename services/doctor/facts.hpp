@@ -14,8 +14,8 @@ namespace jostle::services {
 
 struct Facts {
   std::string host;
-  std::string version;    ///< of Jostle
-  std::string types;      ///< hash of all wire types
+  std::string version;  ///< of Jostle
+  std::string types;    ///< hash of all wire types
   int domain = 0;
   std::string discovery;  ///< as --discovery has it
   std::string identity;   ///< name and role; empty: unprotected

@@ -14,8 +14,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kLongestLine = 1 << 16;    // bytes
-constexpr std::chrono::seconds kAnswer{15};      // the other doctor looks at its own machine first
+constexpr std::size_t kLongestLine = 1 << 16;  // bytes
+constexpr std::chrono::seconds kAnswer{15};    // the other doctor looks at its own machine first
 
 }  // namespace
 
@@ -77,7 +77,8 @@ Result<Door> Door::open(int port) {
   setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   const sockaddr_in here = endpoint(any_address(), port);
   if (bind(socket.get(), generic(here), sizeof here) != 0 || listen(socket.get(), 1) != 0) {
-    return Error{Code::kUnavailable, fmt::format("TCP port {}: {}; wanted a free one, see --port", port, std::strerror(errno))};
+    return Error{Code::kUnavailable,
+                 fmt::format("TCP port {}: {}; wanted a free one, see --port", port, std::strerror(errno))};
   }
   return Door(std::move(socket));
 }

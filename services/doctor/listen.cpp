@@ -13,14 +13,19 @@ namespace {
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kIdle{60};          // an asker that says nothing for so long is gone
-constexpr std::chrono::milliseconds kHear{1000};   // for a datagram that was sent already
+constexpr std::chrono::seconds kIdle{60};         // an asker that says nothing for so long is gone
+constexpr std::chrono::milliseconds kHear{1000};  // for a datagram that was sent already
 
 // What one asker wants to know, until it leaves.
 class Answers {
  public:
-  Answers(const dds::Participant& participant, const Echo& echo, const std::function<std::vector<Check>()>& examine, in_addr asker)
-      : participant_(participant), echo_(echo), examine_(examine), asker_(asker), through_(route_to(asker).value_or(any_address())) {}
+  Answers(const dds::Participant& participant, const Echo& echo, const std::function<std::vector<Check>()>& examine,
+          in_addr asker)
+      : participant_(participant),
+        echo_(echo),
+        examine_(examine),
+        asker_(asker),
+        through_(route_to(asker).value_or(any_address())) {}
 
   // Values of wrong types are exceptions of the JSON library.
   json to(const json& question) {
@@ -42,7 +47,8 @@ class Answers {
   static std::string datagram(const json& question) { return test_datagram(question.at("text"), question.at("size")); }
 
   json listen(bool multicast) {
-    auto ear_result = multicast ? Ear::open(multicast_port(participant_.domain()), through_) : Ear::open_in_domain(participant_.domain());
+    auto ear_result = multicast ? Ear::open(multicast_port(participant_.domain()), through_)
+                                : Ear::open_in_domain(participant_.domain());
     if (!ear_result) return {{"error", ear_result.error().message}};
     ear_ = std::move(ear_result).value();
     return {{"port", ear_->port()}};
@@ -51,7 +57,8 @@ class Answers {
   json send(const json& question) const {
     const bool multicast = question.at("multicast");
     const in_addr to = multicast ? in_addr{inet_addr(kGroup)} : asker_;
-    const auto ok = send_datagram(datagram(question), to, question.at("port"), multicast ? std::optional(through_) : std::nullopt);
+    const auto ok =
+        send_datagram(datagram(question), to, question.at("port"), multicast ? std::optional(through_) : std::nullopt);
     return ok ? json::object() : json{{"error", ok.error().message}};
   }
 

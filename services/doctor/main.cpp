@@ -58,19 +58,23 @@ int listen(const Arguments& arguments, std::stop_token stop) {
   auto door_result = Door::open(arguments.peer.port);
   if (!door_result) return fail(door_result.error(), kExitBroken);
   const auto notice = [](const std::string& text) { fmt::print(stderr, "jostle doctor: {}\n", text); };
-  notice(fmt::format("listens at TCP port {}, domain {}; on the other host: jostle doctor --peer HOST", arguments.peer.port,
-                     participant_result->domain()));
-  listen_to_peers(*participant_result, std::move(door_result).value(), [&] {
-    auto all = checks;
-    std::ranges::copy(check_discovery_servers(*participant_result), std::back_inserter(all));
-    return all;
-  }, notice, std::move(stop));
+  notice(fmt::format("listens at TCP port {}, domain {}; on the other host: jostle doctor --peer HOST",
+                     arguments.peer.port, participant_result->domain()));
+  listen_to_peers(
+      *participant_result, std::move(door_result).value(),
+      [&] {
+        auto all = checks;
+        std::ranges::copy(check_discovery_servers(*participant_result), std::back_inserter(all));
+        return all;
+      },
+      notice, std::move(stop));
   return kExitOk;
 }
 
 int report(const Arguments& arguments) {
   std::vector<Check> checks = examine(arguments.participant.domain);
-  if (!arguments.peer.host.empty()) std::ranges::copy(check_peer(arguments.peer, arguments.participant), std::back_inserter(checks));
+  if (!arguments.peer.host.empty())
+    std::ranges::copy(check_peer(arguments.peer, arguments.participant), std::back_inserter(checks));
   if (arguments.as_json) {
     fmt::print("{}\n", to_json(checks).dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   } else {
@@ -86,14 +90,18 @@ int report(const Arguments& arguments) {
 int main(int argc, char** argv) {
   using namespace jostle::services;
   Arguments arguments;
-  CLI::App app{"Says what is wrong with this machine, and the remedy; with --peer also what is wrong between it and\n"
-               "another one, on which `jostle doctor --listen` runs. Exits with 1 if anything FAILs.",
-               "jostle doctor"};
+  CLI::App app{
+      "Says what is wrong with this machine, and the remedy; with --peer also what is wrong between it and\n"
+      "another one, on which `jostle doctor --listen` runs. Exits with 1 if anything FAILs.",
+      "jostle doctor"};
   app.add_flag("--json", arguments.as_json, "a list of {name, verdict, finding, remedy}");
   app.add_flag("--clean", arguments.clean, "first remove shared memory that killed processes left behind");
   auto* listens = app.add_flag("--listen", arguments.listen, "Answer the doctor of another host, until told to end");
-  app.add_option("--peer", arguments.peer.host, "Address or name of a host: check what works between it and this one")->excludes(listens);
-  app.add_option("--port", arguments.peer.port, "TCP, at which the listening one answers")->capture_default_str()->check(CLI::Range(1, 65535));
+  app.add_option("--peer", arguments.peer.host, "Address or name of a host: check what works between it and this one")
+      ->excludes(listens);
+  app.add_option("--port", arguments.peer.port, "TCP, at which the listening one answers")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 65535));
   ProcessOptions process;
   add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;

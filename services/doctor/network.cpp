@@ -51,8 +51,10 @@ Check check_interface(const std::string& name, in_addr address) {
   }
   check.verdict = Verdict::kFail;
   check.finding = fmt::format("{}: {}", kGroup, ok.error().message);
-  check.remedy = fmt::format("ip link set {} multicast on, and let a firewall pass UDP to {}; or "
-                             "--discovery peers:HOST,HOST,...", name, kGroup);
+  check.remedy = fmt::format(
+      "ip link set {} multicast on, and let a firewall pass UDP to {}; or "
+      "--discovery peers:HOST,HOST,...",
+      name, kGroup);
   return check;
 }
 
@@ -62,7 +64,8 @@ std::vector<Check> check_multicast() {
   std::vector<Check> checks{check_interface("lo", {htonl(INADDR_LOOPBACK)})};
   const auto address = route_to({inet_addr(kGroup)});
   if (!address) {
-    checks.push_back({"multicast route", Verdict::kWarn, fmt::format("none to {}: only this machine is reachable", kGroup),
+    checks.push_back({"multicast route", Verdict::kWarn,
+                      fmt::format("none to {}: only this machine is reachable", kGroup),
                       "ip route add 239.0.0.0/8 dev INTERFACE"});
     return checks;
   }

@@ -141,8 +141,9 @@ Check check_shared_memory() {
   check.finding = fmt::format("{}: {:.0f} MiB free", kFolder.string(), free);
   if (free < kEnoughMiB) {
     check.verdict = Verdict::kWarn;
-    check.remedy = "remount it larger (mount -o remount,size=512M /dev/shm); in a container use "
-                   "--shm-size=512m or --ipc=host";
+    check.remedy =
+        "remount it larger (mount -o remount,size=512M /dev/shm); in a container use "
+        "--shm-size=512m or --ipc=host";
   }
   return check;
 }
@@ -151,8 +152,7 @@ Check check_leftovers() {
   const std::vector<Leftover> leftovers = find_leftovers();
   if (leftovers.empty()) return {"leftovers", Verdict::kOk, "no shared memory of killed processes", ""};
   return {"leftovers", Verdict::kWarn,
-          fmt::format("segments and ports of killed processes: {}, {:.1f} MiB", leftovers.size(),
-                      mebibytes(leftovers)),
+          fmt::format("segments and ports of killed processes: {}, {:.1f} MiB", leftovers.size(), mebibytes(leftovers)),
           "jostle doctor --clean"};
 }
 

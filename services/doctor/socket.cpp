@@ -15,8 +15,8 @@
 namespace jostle::services {
 namespace {
 
-constexpr std::chrono::milliseconds kGlance{50};   // between two looks at a stop request
-constexpr int kParticipants = 120;                 // of a host and domain: then the ports are another domain's
+constexpr std::chrono::milliseconds kGlance{50};  // between two looks at a stop request
+constexpr int kParticipants = 120;                // of a host and domain: then the ports are another domain's
 constexpr std::size_t kLargestDatagram = 1 << 16;
 
 }  // namespace

@@ -58,7 +58,6 @@ std::string failed_step(const std::string& step);
 /// Fast DDS's discovery group: RTPS 2.2, Sec. 9.6.1.4.
 inline constexpr const char* kGroup = "239.255.0.1";
 
-
 /// Waits for datagrams at one port.
 class Ear {
  public:

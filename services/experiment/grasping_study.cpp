@@ -34,8 +34,8 @@ GraspingStudy read(yaml::Fields& fields, std::string& parameters) {
   return study;
 }
 
-double execution_cost(const physics_pool::TaskGeometry& geometry,
-                      const physics_pool::Objective& objective, const Trajectory& states) {
+double execution_cost(const physics_pool::TaskGeometry& geometry, const physics_pool::Objective& objective,
+                      const Trajectory& states) {
   const std::vector<double> still(kGripperAxes, 0.0);
   double sum = physics_pool::final_cost(geometry, objective, states.back());
   for (std::size_t t = 0; t + 1 < states.size(); ++t) {
@@ -75,8 +75,8 @@ Result<planners::Outcome> grasp(const GraspingStudy& study, const GraspingRun& r
     setup.make_feasible = [&believed](const State& x) { return physics_pool::separate(*believed, x); };
   }
   planners::ControlOptions options = study.parameters.control;
-  options.method = run.controller == "or" ? planners::ControlOptions::Method::kOnline
-                                          : planners::ControlOptions::Method::kNaive;
+  options.method =
+      run.controller == "or" ? planners::ControlOptions::Method::kOnline : planners::ControlOptions::Method::kNaive;
   auto outcome_result = planners::run_controller(setup, options, {}, stop);
   if (outcome_result) {
     cost = execution_cost(believed->geometry(), setup.objective, outcome_result->observed);
@@ -144,8 +144,9 @@ class GraspingStudyRunner final : public Study {
 
   Result<StudyReport> run(const StudyOptions& options) override {
     if (!options.models.empty() || options.samples) {
-      return Error{Code::kInvalidArgument, "this study has no --models and no --samples, wanted --seeds, --levels, "
-                                           "--controllers, --timeout"};
+      return Error{Code::kInvalidArgument,
+                   "this study has no --models and no --samples, wanted --seeds, --levels, "
+                   "--controllers, --timeout"};
     }
     GraspingStudy study = study_;
     if (options.seeds) std::tie(study.first_seed, study.last_seed) = *options.seeds;
@@ -210,9 +211,8 @@ std::vector<GraspingRun> run_study(const GraspingStudy& study, const StudyOption
 
 std::string study_table(const GraspingStudy& study, const std::vector<GraspingRun>& runs) {
   std::string text = study.title + "\n\n";
-  text += fmt::format("{:<8}{:<12}{:<10}{:<16}{:<9}{:<16}{:<18}{:<16}{}\n", "level", "controller",
-                      "success", "95 % interval", "thesis", "re-plans", "execution cost",
-                      "plan, s", "total, s");
+  text += fmt::format("{:<8}{:<12}{:<10}{:<16}{:<9}{:<16}{:<18}{:<16}{}\n", "level", "controller", "success",
+                      "95 % interval", "thesis", "re-plans", "execution cost", "plan, s", "total, s");
   for (const Cell& cell : cells(study, runs)) {
     const Share share = share_of(cell);
     std::string thesis = "-";
@@ -227,12 +227,12 @@ std::string study_table(const GraspingStudy& study, const std::vector<GraspingRu
     };
     text += fmt::format("{:<8}{:<12}{:<10}{:<16}{:<9}{:<16}{:<18}{:<16}{}\n", cell.level, cell.controller,
                         fmt::format("{}/{}", share.successes, share.runs),
-                        fmt::format("{:.2f} to {:.2f}", share.low, share.high), thesis,
-                        with_interval(replans, 1), with_interval(cost, 0),
-                        with_interval(plan_seconds, 1), with_interval(seconds, 1));
+                        fmt::format("{:.2f} to {:.2f}", share.low, share.high), thesis, with_interval(replans, 1),
+                        with_interval(cost, 0), with_interval(plan_seconds, 1), with_interval(seconds, 1));
   }
-  text += "\nRe-plans, cost and times: mean of the successful runs and 95 % interval of the mean;\n"
-          "one thread per run. The world stands still while its planner thinks.\n";
+  text +=
+      "\nRe-plans, cost and times: mean of the successful runs and 95 % interval of the mean;\n"
+      "one thread per run. The world stands still while its planner thinks.\n";
   return text;
 }
 
@@ -252,19 +252,18 @@ nlohmann::json study_json(const GraspingStudy& study, const std::vector<Grasping
   }
   for (const GraspingRun& run : runs) {
     const planners::Outcome& outcome = run.outcome;
-    json["runs"].push_back(
-        {{"seed", run.seed},
-         {"level", run.level},
-         {"controller", run.controller},
-         {"success", outcome.success},
-         {"reason", run.error.empty() ? outcome.reason : run.error},
-         {"plan_hash", to_string(hash_of(outcome.first_plan.controls.values))},
-         {"plan_seconds", outcome.plan_time.count()},
-         {"total_seconds", outcome.total_time.count()},
-         {"replans", outcome.replans},
-         {"actions", outcome.actions},
-         {"rollouts", outcome.rollouts},
-         {"execution_cost", run.execution_cost}});
+    json["runs"].push_back({{"seed", run.seed},
+                            {"level", run.level},
+                            {"controller", run.controller},
+                            {"success", outcome.success},
+                            {"reason", run.error.empty() ? outcome.reason : run.error},
+                            {"plan_hash", to_string(hash_of(outcome.first_plan.controls.values))},
+                            {"plan_seconds", outcome.plan_time.count()},
+                            {"total_seconds", outcome.total_time.count()},
+                            {"replans", outcome.replans},
+                            {"actions", outcome.actions},
+                            {"rollouts", outcome.rollouts},
+                            {"execution_cost", run.execution_cost}});
   }
   return json;
 }

@@ -51,7 +51,8 @@ int main(int argc, char** argv) {
   app.add_option("--plot", picture, "PNG file for the figure, where the study has one");
   app.add_option("--jobs", options.jobs, "Runs at a time")->capture_default_str()->check(CLI::Range(1, 1024));
   app.add_option("--seeds", seeds, "Scenes, such as 1-10, or the first seed (default: the study's)");
-  app.add_option("--samples", options.samples, "Initial states per group (default: the study's)")->check(CLI::Range(1, 100000));
+  app.add_option("--samples", options.samples, "Initial states per group (default: the study's)")
+      ->check(CLI::Range(1, 100000));
   app.add_option("--models", options.models, "Coarse models or predictors, such as planar,learned")->delimiter(',');
   app.add_option("--levels", options.levels, "Uncertainty levels, such as none,medium")->delimiter(',');
   app.add_option("--controllers", options.controllers, "Controllers, such as or,nr")->delimiter(',');

@@ -66,9 +66,7 @@ void touch(const Scene& scene, double across, RolloutBatch& batch) {
   batch.x0.q[1] = object.y + across;
 }
 
-double half_side(const SceneObject& object) {
-  return object.shape == Shape::kBox ? object.size[1] / 2 : object.radius;
-}
+double half_side(const SceneObject& object) { return object.shape == Shape::kBox ? object.size[1] / 2 : object.radius; }
 
 // Footnote 2 of Ch. 6: the pusher's place across its motion is uniform within the edges.
 void add_open_loop(const PredictionStudy& study, int actions, PredictionCases& result) {
@@ -145,9 +143,10 @@ PredictionCases make_cases(const PredictionStudy& study) {
       result.scenes.push_back(scene_of(study, study.shape, sliders));
       CounterStream random(study.seed, static_cast<std::uint32_t>(100 * sliders + actions));
       for (int i = 0; i < study.samples; ++i) {
-        result.cases.push_back({.group = fmt::format("{} slider{}, {} actions", sliders, sliders == 1 ? "" : "s", actions),
-                                .scene = result.scenes.size() - 1,
-                                .batch = random_case(study, result.scenes.back(), actions, random)});
+        result.cases.push_back(
+            {.group = fmt::format("{} slider{}, {} actions", sliders, sliders == 1 ? "" : "s", actions),
+             .scene = result.scenes.size() - 1,
+             .batch = random_case(study, result.scenes.back(), actions, random)});
       }
     }
   }

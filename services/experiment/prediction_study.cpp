@@ -72,8 +72,8 @@ Distance distance(const StateLayout& layout, const Trajectory& a, const Trajecto
 
 // What one case gave with one model; empty if nothing was pushed.
 struct Made {
-  std::vector<Distance> levels;   // [N + 1], from the truth
-  double moved = 0.0;             // m, mean over sliders, in truth
+  std::vector<Distance> levels;  // [N + 1], from the truth
+  double moved = 0.0;            // m, mean over sliders, in truth
   std::string problem;
 };
 
@@ -135,7 +135,8 @@ Made make(const PredictionStudy& study, const PredictionCases& cases, std::size_
   double farthest = 0.0;
   for (const ObjectSlot& slot : update.layout().objects) {
     const auto q = static_cast<std::size_t>(slot.q);
-    const double way = std::hypot(truth.back().q[q] - truth.front().q[q], truth.back().q[q + 1] - truth.front().q[q + 1]);
+    const double way =
+        std::hypot(truth.back().q[q] - truth.front().q[q], truth.back().q[q + 1] - truth.front().q[q + 1]);
     farthest = std::max(farthest, way);
     made.moved += way / static_cast<double>(update.layout().objects.size());
   }
@@ -172,8 +173,9 @@ class PredictionStudyRunner final : public Study {
 
   Result<StudyReport> run(const StudyOptions& options) override {
     if (!options.levels.empty() || !options.controllers.empty() || options.timeout) {
-      return Error{Code::kInvalidArgument, "this study has no --levels, --controllers or --timeout, wanted --models, "
-                                           "--samples, --seeds FIRST"};
+      return Error{Code::kInvalidArgument,
+                   "this study has no --levels, --controllers or --timeout, wanted --models, "
+                   "--samples, --seeds FIRST"};
     }
     PredictionStudy study = study_;
     if (!options.models.empty()) study.models = options.models;
@@ -239,7 +241,8 @@ class PredictionStudyRunner final : public Study {
       }
       add_group(study, row, result);
     }
-    if (idle > 0) result.table += fmt::format("\n{} of {} cases left out: nothing was pushed.\n", idle, cases.cases.size());
+    if (idle > 0)
+      result.table += fmt::format("\n{} of {} cases left out: nothing was pushed.\n", idle, cases.cases.size());
     result.table += "\nMeans over the cases with 95 % intervals of the mean.\n";
     if (!study.remark.empty()) result.table += study.remark + "\n";
     // What a reader of one model finds at the top.
@@ -257,16 +260,20 @@ class PredictionStudyRunner final : public Study {
     double squares = 0.0;
     for (const double mm : moved) squares += (mm - way.value) * (mm - way.value);
     const double deviation = moved.size() > 1 ? std::sqrt(squares / static_cast<double>(moved.size() - 1)) : 0.0;
-    result.table += fmt::format("\n{}{} predictions per model; sliders moved {:.0f} ± {:.0f} mm\n",
-                                row.front().group.empty() ? "" : row.front().group + ": ", moved.size(), way.value, deviation);
+    result.table +=
+        fmt::format("\n{}{} predictions per model; sliders moved {:.0f} ± {:.0f} mm\n",
+                    row.front().group.empty() ? "" : row.front().group + ": ", moved.size(), way.value, deviation);
     result.table += fmt::format("{:<16}{:<11}{:<20}{:<20}{:<22}{}\n", "model", "iteration", "translation, mm",
                                 "rotation, deg", "RMS positions, mm", "thesis, mm and deg");
     Panel panel{.x_label = (row.front().group.empty() ? "" : row.front().group + ": ") + "iteration",
                 .y_label = label(study.measure),
                 .log_y = true};
     for (const Cell& cell : row) {
-      nlohmann::json entry{{"model", cell.model}, {"group", cell.group}, {"predictions", cell.made.size()},
-                           {"moved_mm", way.value}, {"moved_deviation_mm", deviation}};
+      nlohmann::json entry{{"model", cell.model},
+                           {"group", cell.group},
+                           {"predictions", cell.made.size()},
+                           {"moved_mm", way.value},
+                           {"moved_deviation_mm", deviation}};
       Band band{.name = cell.model};
       for (int k = 0; k <= cell.iterations(); ++k) {
         const Mean mm = mean_of(cell.values(k, translation)), deg = mean_of(cell.values(k, rotation));
@@ -285,13 +292,18 @@ class PredictionStudyRunner final : public Study {
           by_slider.push_back(mean_of(cell.values(k, [i](const Distance& d) { return d.by_slider_mm[i]; })).value);
         }
         entry["rows"].push_back({{"iteration", k},
-                                 {"trans_mm", mm.value}, {"trans_mm_half_width", mm.half_width},
-                                 {"rot_deg", deg.value}, {"rot_deg_half_width", deg.half_width},
-                                 {"rms_positions_mm", rms.value}, {"rms_positions_mm_half_width", rms.half_width},
-                                 {"rms_state", whole.value}, {"rms_state_half_width", whole.half_width},
+                                 {"trans_mm", mm.value},
+                                 {"trans_mm_half_width", mm.half_width},
+                                 {"rot_deg", deg.value},
+                                 {"rot_deg_half_width", deg.half_width},
+                                 {"rms_positions_mm", rms.value},
+                                 {"rms_positions_mm_half_width", rms.half_width},
+                                 {"rms_state", whole.value},
+                                 {"rms_state_half_width", whole.half_width},
                                  {"rms_by_slider_mm", by_slider}});
-        const Mean& shown = study.measure == PredictionStudy::Measure::kFinal ? mm
-                            : study.measure == PredictionStudy::Measure::kState ? whole : rms;
+        const Mean& shown = study.measure == PredictionStudy::Measure::kFinal   ? mm
+                            : study.measure == PredictionStudy::Measure::kState ? whole
+                                                                                : rms;
         if (shown.value <= 0) continue;  // exact: nowhere on a logarithmic axis
         band.x.push_back(k);
         band.low.push_back(std::max(shown.value - shown.half_width, 0.1 * shown.value));
@@ -306,9 +318,12 @@ class PredictionStudyRunner final : public Study {
 
   static std::string label(PredictionStudy::Measure measure) {
     switch (measure) {
-      case PredictionStudy::Measure::kFinal: return "distance of last states, mm";
-      case PredictionStudy::Measure::kPositions: return "RMS error of positions, mm";
-      case PredictionStudy::Measure::kState: return "RMS error of states (m, rad, m/s, rad/s)";
+      case PredictionStudy::Measure::kFinal:
+        return "distance of last states, mm";
+      case PredictionStudy::Measure::kPositions:
+        return "RMS error of positions, mm";
+      case PredictionStudy::Measure::kState:
+        return "RMS error of states (m, rad, m/s, rad/s)";
     }
     return "";
   }
@@ -326,13 +341,16 @@ Result<std::unique_ptr<Study>> read_prediction_study(yaml::Fields& fields, const
   PredictionStudy study;
   fields.required("title", study.title);
   fields.required("models", study.models);
-  fields.choice<Cases>("cases", study.cases, {{"open-loop", Cases::kOpenLoop}, {"examples", Cases::kExamples},
-                                              {"random", Cases::kRandom}});
-  fields.choice<Measure>("measure", study.measure, {{"final", Measure::kFinal}, {"positions", Measure::kPositions},
-                                                    {"state", Measure::kState}});
+  fields.choice<Cases>("cases", study.cases,
+                       {{"open-loop", Cases::kOpenLoop}, {"examples", Cases::kExamples}, {"random", Cases::kRandom}});
+  fields.choice<Measure>("measure", study.measure,
+                         {{"final", Measure::kFinal}, {"positions", Measure::kPositions}, {"state", Measure::kState}});
   fields.choice<Shape>("shape", study.shape, {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}});
-  fields.choice<Uncertainty>("reality", study.reality, {{"none", Uncertainty::kNone}, {"low", Uncertainty::kLow},
-                                                        {"medium", Uncertainty::kMedium}, {"high", Uncertainty::kHigh}});
+  fields.choice<Uncertainty>("reality", study.reality,
+                             {{"none", Uncertainty::kNone},
+                              {"low", Uncertainty::kLow},
+                              {"medium", Uncertainty::kMedium},
+                              {"high", Uncertainty::kHigh}});
   fields.optional("sliders", study.sliders);
   fields.optional("actions", study.actions);
   fields.optional("duration", study.duration);

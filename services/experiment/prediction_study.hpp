@@ -34,27 +34,27 @@ struct PredictionStudy {
   Cases cases = Cases::kOpenLoop;
   Measure measure = Measure::kFinal;
   physics_pool::Shape shape = physics_pool::Shape::kBox;
-  std::vector<int> sliders{1};      ///< one group of cases each
+  std::vector<int> sliders{1};  ///< one group of cases each
   std::vector<int> actions{4};
-  double duration = 1.0;            ///< Delta_t, s
-  double speed = 0.025;             ///< m/s; random controls have at most this
+  double duration = 1.0;  ///< Delta_t, s
+  double speed = 0.025;   ///< m/s; random controls have at most this
   std::vector<double> angles_deg{0.0};
-  int samples = 100;                ///< initial states per group
+  int samples = 100;  ///< initial states per group
   std::uint64_t seed = 1;
-  std::string integrator = "rk4";   ///< of the fine model
-  double time_step = 0.001;         ///< s
+  std::string integrator = "rk4";  ///< of the fine model
+  double time_step = 0.001;        ///< s
   /// Compare with an execution world that is as badly known as this.
   physics_pool::Uncertainty reality = physics_pool::Uncertainty::kNone;
   /// The thesis's numbers by iteration, where it gives them.
   std::vector<double> thesis_trans_mm, thesis_rot_deg;
-  std::string remark;               ///< printed below the table
+  std::string remark;  ///< printed below the table
 };
 
 /// One prediction to make.
 struct PredictionCase {
   std::string group;
-  std::size_t scene = 0;            ///< index into PredictionCases::scenes
-  physics_pool::RolloutBatch batch; ///< one sample, no noise
+  std::size_t scene = 0;             ///< index into PredictionCases::scenes
+  physics_pool::RolloutBatch batch;  ///< one sample, no noise
 };
 struct PredictionCases {
   std::vector<physics_pool::Scene> scenes;

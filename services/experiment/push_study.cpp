@@ -100,8 +100,8 @@ StudyReport report(const PushStudy& study, const std::vector<PushRun>& runs) {
     const Share share = wilson_interval(static_cast<int>(cell.successes.size()), static_cast<int>(cell.runs.size()));
     const Mean taken = cell.over_runs(actions), planned = cell.over_runs(planning), each = cell.over_runs(per_plan);
     const Mean whole = cell.over_runs(completion);
-    result.table += fmt::format("{:<28}{:<9}{:<10}{:<16}{:<14}{:<18}{:<18}{}\n", cell.entry.predictor, cell.entry.threads,
-                                fmt::format("{}/{}", share.successes, share.runs),
+    result.table += fmt::format("{:<28}{:<9}{:<10}{:<16}{:<14}{:<18}{:<18}{}\n", cell.entry.predictor,
+                                cell.entry.threads, fmt::format("{}/{}", share.successes, share.runs),
                                 fmt::format("{:.2f} to {:.2f}", share.low, share.high), text(taken, 1),
                                 text(planned, 2), text(each, 3), text(whole, 1));
     result.json["rows"].push_back({{"predictor", cell.entry.predictor},
@@ -124,8 +124,9 @@ StudyReport report(const PushStudy& study, const std::vector<PushRun>& runs) {
                            .middle = {whole.value, whole.value},
                            .high = {high, high}});
   }
-  result.table += "\nMeans over all runs, failed ones too, with 95 % intervals of the mean. Completion: planning, and an\n"
-                  "action's duration for each action. The world stands still while its planner thinks.\n";
+  result.table +=
+      "\nMeans over all runs, failed ones too, with 95 % intervals of the mean. Completion: planning, and an\n"
+      "action's duration for each action. The world stands still while its planner thinks.\n";
   if (!study.remark.empty()) result.table += study.remark + "\n";
   result.panels = {panel};
   for (const PushRun& run : runs) {
@@ -150,8 +151,9 @@ class PushStudyRunner final : public Study {
 
   Result<StudyReport> run(const StudyOptions& options) override {
     if (!options.levels.empty() || !options.controllers.empty() || options.samples || !options.models.empty()) {
-      return Error{Code::kInvalidArgument, "this study has no --levels, --controllers, --samples or --models, wanted "
-                                           "--seeds, --timeout"};
+      return Error{Code::kInvalidArgument,
+                   "this study has no --levels, --controllers, --samples or --models, wanted "
+                   "--seeds, --timeout"};
     }
     PushStudy study = study_;
     if (options.seeds) std::tie(study.first_seed, study.last_seed) = *options.seeds;
@@ -159,10 +161,10 @@ class PushStudyRunner final : public Study {
     const std::size_t total = study.entries.size() * (study.last_seed - study.first_seed + 1);
     std::size_t done = 0;
     const auto runs = run_study(study, options, [&](const PushRun& run) {
-      options.on_progress(fmt::format("[{:>3}/{}] seed {:<4} {:<28} x{} {:<7} {} ({} actions, {:.2f} s of planning)", ++done,
-                                      total, run.seed, study.entries[run.entry].predictor, study.entries[run.entry].threads,
-                                      run.outcome.success ? "ok" : "FAILED", run.error.empty() ? run.outcome.reason : run.error,
-                                      run.outcome.actions, planning(run)));
+      options.on_progress(fmt::format(
+          "[{:>3}/{}] seed {:<4} {:<28} x{} {:<7} {} ({} actions, {:.2f} s of planning)", ++done, total, run.seed,
+          study.entries[run.entry].predictor, study.entries[run.entry].threads, run.outcome.success ? "ok" : "FAILED",
+          run.error.empty() ? run.outcome.reason : run.error, run.outcome.actions, planning(run)));
     });
     if (options.stop.stop_requested()) return Error{Code::kCancelled, "experiment: stopped on request"};
     return report(study, runs);
@@ -206,8 +208,11 @@ Result<std::unique_ptr<Study>> read_push_study(yaml::Fields& fields, const std::
   fields.optional("objects", study.objects);
   fields.optional("remark", study.remark);
   fields.choice<Shape>("shape", study.shape, {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}});
-  fields.choice<Uncertainty>("reality", study.reality, {{"none", Uncertainty::kNone}, {"low", Uncertainty::kLow},
-                                                        {"medium", Uncertainty::kMedium}, {"high", Uncertainty::kHigh}});
+  fields.choice<Uncertainty>("reality", study.reality,
+                             {{"none", Uncertainty::kNone},
+                              {"low", Uncertainty::kLow},
+                              {"medium", Uncertainty::kMedium},
+                              {"high", Uncertainty::kHigh}});
   fields.section("seeds", true, [&](yaml::Fields& seeds) {
     seeds.required("first", study.first_seed);
     seeds.required("last", study.last_seed);

@@ -21,19 +21,22 @@ Result<std::unique_ptr<Study>> load_study(const std::string& name) {
   auto text_result = read_text(file);
   if (!text_result) {
     return Error{Code::kNotFound, fmt::format("experiment: got '{}', wanted one of `jostle experiment "
-                                              "list` ({})", name, text_result.error().message)};
+                                              "list` ({})",
+                                              name, text_result.error().message)};
   }
   using Loaded = std::unique_ptr<Study>;
   return yaml::parse<Loaded>(*text_result, file.string(), [&](const YAML::Node& root) -> Result<Loaded> {
     yaml::Fields fields(root, "", file.string());
     auto read = &read_grasping_study;
-    fields.choice<decltype(read)>("study", read, {{"grasping", &read_grasping_study},
-                                                  {"prediction", &read_prediction_study},
-                                                  {"push", &read_push_study},
-                                                  {"timing", &read_timing_study}});
+    fields.choice<decltype(read)>("study", read,
+                                  {{"grasping", &read_grasping_study},
+                                   {"prediction", &read_prediction_study},
+                                   {"push", &read_push_study},
+                                   {"timing", &read_timing_study}});
     if (!root["study"]) {
       return Error{Code::kInvalidArgument, fmt::format("{}: study: missing, wanted a kind of study: these are "
-                                                       "parameters", file.string())};
+                                                       "parameters",
+                                                       file.string())};
     }
     auto study_result = read(fields, file.string());
     fields.finish();

@@ -20,11 +20,11 @@ namespace jostle::services {
 
 /// What the command line may change of a study. A study refuses what it does not have.
 struct StudyOptions {
-  int jobs = 1;  ///< runs at a time
+  int jobs = 1;                                                  ///< runs at a time
   std::optional<std::pair<std::uint64_t, std::uint64_t>> seeds;  ///< first and last
-  std::vector<std::string> levels, controllers;  ///< grasping
-  std::optional<std::chrono::milliseconds> timeout;  ///< of one run
-  std::vector<std::string> models;  ///< coarse models, or predictors
+  std::vector<std::string> levels, controllers;                  ///< grasping
+  std::optional<std::chrono::milliseconds> timeout;              ///< of one run
+  std::vector<std::string> models;                               ///< coarse models, or predictors
   std::optional<int> samples;
   std::stop_token stop;
   /// Called from one thread at a time: a line for people.
@@ -32,10 +32,10 @@ struct StudyOptions {
 };
 
 struct StudyReport {
-  std::string table;         ///< for people
-  nlohmann::json json;       ///< all numbers
-  std::vector<Panel> panels; ///< the figure; empty for a table
-  bool broken = false;       ///< parts of the system failed
+  std::string table;          ///< for people
+  nlohmann::json json;        ///< all numbers
+  std::vector<Panel> panels;  ///< the figure; empty for a table
+  bool broken = false;        ///< parts of the system failed
 };
 
 class Study {

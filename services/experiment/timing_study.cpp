@@ -34,8 +34,9 @@ class TimingStudy final : public Study {
   Result<StudyReport> run(const StudyOptions& options) override {
     if (!options.levels.empty() || !options.controllers.empty() || options.timeout || options.seeds ||
         options.models.size() > 1) {
-      return Error{Code::kInvalidArgument, "this study has no --levels, --controllers, --timeout or --seeds, wanted "
-                                           "one of --models, --samples"};
+      return Error{Code::kInvalidArgument,
+                   "this study has no --levels, --controllers, --timeout or --seeds, wanted "
+                   "one of --models, --samples"};
     }
     const std::string model = coarse_model_name(options.models.empty() ? model_ : options.models.front());
     const int runs = options.samples.value_or(runs_);
@@ -50,12 +51,13 @@ class TimingStudy final : public Study {
     // One of each in turn, so that what slows the machine slows all alike.
     std::vector<std::unique_ptr<PararealPool>> predictors;
     for (int k = 1; k <= actions_; ++k) {
-      predictors.push_back(std::make_unique<PararealPool>(many, PararealOptions{.model = model, .stop = {.iterations = k}}));
+      predictors.push_back(
+          std::make_unique<PararealPool>(many, PararealOptions{.model = model, .stop = {.iterations = k}}));
       if (auto ok = predictors.back()->load(scene); !ok) return ok.error();
     }
     std::vector<std::vector<double>> times(predictors.size() + 1);  // ms; the last is the fine model's
     std::vector<double> slices;                                     // ms
-    for (int run = -1; run < runs; ++run) {  // the first one is not counted
+    for (int run = -1; run < runs; ++run) {                         // the first one is not counted
       for (std::size_t i = 0; i <= predictors.size(); ++i) {
         Pool& pool = i < predictors.size() ? static_cast<Pool&>(*predictors[i]) : one;
         auto time_result = time(pool, batch, options.stop);
@@ -65,7 +67,8 @@ class TimingStudy final : public Study {
       auto slice_result = time(one, slice_batch(batch, batch.x0, batch.nominal.step(0)), options.stop);
       if (!slice_result) return slice_result.error();
       if (run >= 0) slices.push_back(*slice_result);
-      if (run >= 0 && (run + 1) % std::max(runs / 10, 1) == 0) options.on_progress(fmt::format("[{:>4}/{}] runs", run + 1, runs));
+      if (run >= 0 && (run + 1) % std::max(runs / 10, 1) == 0)
+        options.on_progress(fmt::format("[{:>4}/{}] runs", run + 1, runs));
     }
     auto coarse_result = time_coarse(model, scene, batch);
     if (!coarse_result) return coarse_result.error();
@@ -93,24 +96,35 @@ class TimingStudy final : public Study {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count() / kRepeats;
   }
 
-  StudyReport report(const std::vector<std::vector<double>>& times, double fine, double coarse, int threads, int runs) const {
+  StudyReport report(const std::vector<std::vector<double>>& times, double fine, double coarse, int threads,
+                     int runs) const {
     StudyReport result;
     const Mean serial = mean_of(times.back());
-    result.table = fmt::format("{}\n\n{:<22}{:<20}{:<18}{}\n", title_, "predictor", "time, ms", "Eq. 6.4, ms", "share of the fine model's");
-    result.json = {{"title", title_}, {"model", model_}, {"threads", threads}, {"runs", runs},
-                   {"c_c_ms", coarse}, {"c_f_ms", fine}, {"rows", nlohmann::json::array()}};
+    result.table = fmt::format("{}\n\n{:<22}{:<20}{:<18}{}\n", title_, "predictor", "time, ms", "Eq. 6.4, ms",
+                               "share of the fine model's");
+    result.json = {{"title", title_},
+                   {"model", model_},
+                   {"threads", threads},
+                   {"runs", runs},
+                   {"c_c_ms", coarse},
+                   {"c_f_ms", fine},
+                   {"rows", nlohmann::json::array()}};
     Band measured{.name = "measured"}, expected{.name = "Eq. 6.4"};
     for (std::size_t i = 0; i < times.size(); ++i) {
       const bool is_fine = i + 1 == times.size();
       const int k = static_cast<int>(i) + 1;
       const Mean mean = mean_of(times[i]);
-      const double theory = is_fine ? actions_ * fine
-                                    : actions_ * fine / parareal_speed_up(k, threads, actions_, coarse, fine);
+      const double theory =
+          is_fine ? actions_ * fine : actions_ * fine / parareal_speed_up(k, threads, actions_, coarse, fine);
       const std::string name = is_fine ? "fine, serial" : fmt::format("Parareal, K = {}", k);
-      result.table += fmt::format("{:<22}{:<20}{:<18.2f}{:.2f}\n", name, fmt::format("{:.2f} ± {:.2f}", mean.value, mean.half_width),
-                                  theory, mean.value / serial.value);
-      result.json["rows"].push_back({{"predictor", name}, {"iteration", is_fine ? 0 : k}, {"ms", mean.value},
-                                     {"ms_half_width", mean.half_width}, {"ms_by_eq_6_4", theory},
+      result.table +=
+          fmt::format("{:<22}{:<20}{:<18.2f}{:.2f}\n", name,
+                      fmt::format("{:.2f} ± {:.2f}", mean.value, mean.half_width), theory, mean.value / serial.value);
+      result.json["rows"].push_back({{"predictor", name},
+                                     {"iteration", is_fine ? 0 : k},
+                                     {"ms", mean.value},
+                                     {"ms_half_width", mean.half_width},
+                                     {"ms_by_eq_6_4", theory},
                                      {"share", mean.value / serial.value}});
       if (is_fine) continue;
       measured.x.push_back(k);
@@ -126,10 +140,12 @@ class TimingStudy final : public Study {
       level.middle.push_back(serial.value);
       level.high.push_back(serial.value + serial.half_width);
     }
-    result.panels = {{.x_label = "iterations K", .y_label = "prediction time, ms", .bands = {measured, expected, level}}};
-    result.table += fmt::format("\n{} slices on {} threads, coarse model {}; means of {} runs with 95 % intervals. Iterations skip what has\n"
-                                "converged, which Eq. 6.4 does not count. The thesis: 28 % with K = 1 on 4 cores.\n",
-                                actions_, threads, model_, runs);
+    result.panels = {
+        {.x_label = "iterations K", .y_label = "prediction time, ms", .bands = {measured, expected, level}}};
+    result.table += fmt::format(
+        "\n{} slices on {} threads, coarse model {}; means of {} runs with 95 % intervals. Iterations skip what has\n"
+        "converged, which Eq. 6.4 does not count. The thesis: 28 % with K = 1 on 4 cores.\n",
+        actions_, threads, model_, runs);
     return result;
   }
 

@@ -49,8 +49,10 @@ Result<void> init(const Arguments& arguments) {
   for (const char* role : {"robot", "worker"}) {
     if (auto ok = issue_one(arguments, role, role); !ok) return ok;
   }
-  fmt::print("\nGive a program its folder with --secure, and copy others' folders to their hosts (scp -rp).\n"
-             "{} makes identities: it stays here.\n", (fs::path(arguments.folder) / "ca" / "ca.key").string());
+  fmt::print(
+      "\nGive a program its folder with --secure, and copy others' folders to their hosts (scp -rp).\n"
+      "{} makes identities: it stays here.\n",
+      (fs::path(arguments.folder) / "ca" / "ca.key").string());
   return {};
 }
 
@@ -61,7 +63,8 @@ Result<void> revoke(const Arguments& arguments) {
   if (!files_result) return files_result.error();
   fmt::print("{} is revoked. Renewed:\n", arguments.name);
   for (const fs::path& file : *files_result) fmt::print("  {}\n", file.string());
-  fmt::print("Other hosts' copies need the new crl.pem, too. Running programs read it when they start: restart them.\n");
+  fmt::print(
+      "Other hosts' copies need the new crl.pem, too. Running programs read it when they start: restart them.\n");
   return {};
 }
 
@@ -71,7 +74,9 @@ Result<void> list(const Arguments& arguments) {
   if (arguments.as_json) {
     nlohmann::json list = nlohmann::json::array();
     for (const keystore::Entry& entry : *entries_result) {
-      list.push_back({{"name", entry.name}, {"role", to_string(entry.role)}, {"serial", entry.serial},
+      list.push_back({{"name", entry.name},
+                      {"role", to_string(entry.role)},
+                      {"serial", entry.serial},
                       {"valid_until", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}",
                                                   fmt::gmtime(std::chrono::system_clock::to_time_t(entry.not_after)))},
                       {"state", to_string(entry.state)}});
@@ -128,19 +133,23 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   };
   const auto add_days = [&](CLI::App* to) {
     to->add_option("--days", arguments.days, "how long it is valid")
-        ->check(CLI::Range(1, static_cast<int>(keystore::kLifetime.count())))->capture_default_str();
+        ->check(CLI::Range(1, static_cast<int>(keystore::kLifetime.count())))
+        ->capture_default_str();
     return to;
   };
   add_days(add_keystore(command("init", "make a keystore, and identities named robot and worker", init)));
   add_days(add_name(add_keystore(command("issue", "make an identity", issue))))
-      ->add_option("--role", arguments.role, "robot: everything; worker: the pool's topics; observer: hears "
-                                             "everything, says nothing; server: joins, no topic")
-      ->check(CLI::IsMember({"robot", "worker", "observer", "server"}))->capture_default_str();
+      ->add_option("--role", arguments.role,
+                   "robot: everything; worker: the pool's topics; observer: hears "
+                   "everything, says nothing; server: joins, no topic")
+      ->check(CLI::IsMember({"robot", "worker", "observer", "server"}))
+      ->capture_default_str();
   add_name(add_keystore(command("revoke", "put an identity on the list of those who are refused", revoke)));
   add_keystore(command("list", "list what was issued: name, role, valid until, state", list))
       ->add_flag("--json", arguments.as_json, "a list of {name, role, serial, valid_until, state}");
   command("check", "say what an identity may do and until when, or what is wrong with its folder", check)
-      ->add_option("folder", arguments.folder, "an identity's folder, or a copy of it")->required();
+      ->add_option("folder", arguments.folder, "an identity's folder, or a copy of it")
+      ->required();
 }
 
 }  // namespace

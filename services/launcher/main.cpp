@@ -16,13 +16,13 @@
 namespace jostle::services {
 namespace {
 
-
 int show_help(const std::filesystem::path& folder) {
-  fmt::print("Plans and executes physics-based manipulation, on as many machines as there are.\n\n"
-             "usage: jostle NAME ARGUMENTS…    runs a program\n"
-             "       jostle help NAME          says what a program takes\n"
-             "       jostle --version\n\n"
-             "programs:\n");
+  fmt::print(
+      "Plans and executes physics-based manipulation, on as many machines as there are.\n\n"
+      "usage: jostle NAME ARGUMENTS…    runs a program\n"
+      "       jostle help NAME          says what a program takes\n"
+      "       jostle --version\n\n"
+      "programs:\n");
   for (const Program& program : installed_programs(folder)) {
     fmt::print("  {:16} {}\n", program.name, program.purpose);
   }
@@ -32,16 +32,14 @@ int show_help(const std::filesystem::path& folder) {
 int complain(const std::filesystem::path& folder, const std::string& name) {
   const std::string meant = nearest(installed_programs(folder), name);
   fmt::print(stderr, "jostle: no program '{}' in {}; {}\n", name, folder.string(),
-             meant.empty() ? "`jostle help` lists what there is"
-                           : fmt::format("did you mean `jostle {}`?", meant));
+             meant.empty() ? "`jostle help` lists what there is" : fmt::format("did you mean `jostle {}`?", meant));
   return kExitUsage;
 }
 
 // Becomes the program; returns only if that failed.
 int become(const std::filesystem::path& folder, const std::string& name, std::vector<char*> arguments) {
   const std::string file = program_file(folder, name).string();
-  if (name.empty() || name.front() == '-' || name.find('/') != std::string::npos ||
-      access(file.c_str(), X_OK) != 0) {
+  if (name.empty() || name.front() == '-' || name.find('/') != std::string::npos || access(file.c_str(), X_OK) != 0) {
     return complain(folder, name);
   }
   arguments.insert(arguments.begin(), const_cast<char*>(file.c_str()));  // execv promises not to write

@@ -50,7 +50,8 @@ Result<Control> parse_control(const std::string& text) {
   }
   const char* end = text.data() + text.size();
   const auto [rest, problem] = std::from_chars(text.data() + colon + 1, end, control.value);
-  if (std::ranges::count(kWithValue, control.command) == 0 || problem != std::errc() || rest != end) return unknown(text);
+  if (std::ranges::count(kWithValue, control.command) == 0 || problem != std::errc() || rest != end)
+    return unknown(text);
   return control;
 }
 
@@ -104,24 +105,37 @@ std::vector<KeyPress> KeyDecoder::feed(std::string_view bytes) {
 std::optional<Control> control_of(const KeyPress& press, const Playback& playback, TimePoint now) {
   const double at = seconds(playback.at(now));
   switch (press.key) {
-    case Key::kSpace: return Control{"toggle"};
-    case Key::kLeft: return Control{"seek", at - kJump};
-    case Key::kRight: return Control{"seek", at + kJump};
-    case Key::kUp: return Control{"rate", faster(playback.rate())};
-    case Key::kDown: return Control{"rate", slower(playback.rate())};
-    case Key::kOther: break;
+    case Key::kSpace:
+      return Control{"toggle"};
+    case Key::kLeft:
+      return Control{"seek", at - kJump};
+    case Key::kRight:
+      return Control{"seek", at + kJump};
+    case Key::kUp:
+      return Control{"rate", faster(playback.rate())};
+    case Key::kDown:
+      return Control{"rate", slower(playback.rate())};
+    case Key::kOther:
+      break;
   }
   if (press.letter >= '0' && press.letter <= '9') {
     const double first = seconds(playback.first()), last = seconds(playback.last());
     return Control{"seek", first + 0.1 * (press.letter - '0') * (last - first)};
   }
   switch (press.letter) {
-    case 's': return Control{"step"};
-    case '+': case '=': return Control{"rate", faster(playback.rate())};
-    case '-': return Control{"rate", slower(playback.rate())};
-    case 'l': return Control{"loop", playback.loops() ? 0.0 : 1.0};
-    case 'q': return Control{"quit"};
-    default: return {};
+    case 's':
+      return Control{"step"};
+    case '+':
+    case '=':
+      return Control{"rate", faster(playback.rate())};
+    case '-':
+      return Control{"rate", slower(playback.rate())};
+    case 'l':
+      return Control{"loop", playback.loops() ? 0.0 : 1.0};
+    case 'q':
+      return Control{"quit"};
+    default:
+      return {};
   }
 }
 

@@ -44,8 +44,7 @@ class KeyDecoder {
 };
 
 /// For the help and the line below the bar.
-inline constexpr const char* kKeyHelp =
-    "space pause  s step  left/right -/+ 5 s  +/- rate  0-9 jump  l loop  q quit";
+inline constexpr const char* kKeyHelp = "space pause  s step  left/right -/+ 5 s  +/- rate  0-9 jump  l loop  q quit";
 
 /// What a key means at this moment; nothing for others.
 std::optional<Control> control_of(const KeyPress& press, const Playback& playback, TimePoint now);

@@ -42,9 +42,10 @@ nlohmann::json to_json(const PlayReport& report, const std::string& bag) {
           {"messages", report.messages},
           {"sent", report.sent},
           {"refused", report.refused},
-          {"late_ms", {{"median", milliseconds(report.lateness.quantile(0.5))},
-                       {"p99", milliseconds(report.lateness.quantile(0.99))},
-                       {"worst", milliseconds(report.lateness.worst())}}},
+          {"late_ms",
+           {{"median", milliseconds(report.lateness.quantile(0.5))},
+            {"p99", milliseconds(report.lateness.quantile(0.99))},
+            {"worst", milliseconds(report.lateness.worst())}}},
           {"reason", report.reason},
           {"problem", report.problem ? report.problem->message : ""}};
 }
@@ -62,7 +63,8 @@ void tell_what_is_left_out(const TopicPlan& plan, LiveLine& line) {
 }
 
 int play(const Arguments& arguments, PlayerOptions options, std::stop_token stop) {
-  TopicChoice choice{.selection = {.topics = arguments.topics, .excluded = arguments.excluded}, .with_clock = options.clock > 0};
+  TopicChoice choice{.selection = {.topics = arguments.topics, .excluded = arguments.excluded},
+                     .with_clock = options.clock > 0};
   for (const std::string& text : arguments.remaps) {
     auto remap_result = parse_remap(text);
     if (!remap_result) return fail(remap_result.error());
@@ -109,10 +111,11 @@ int control(const Arguments& arguments, const RemoteOptions& options, std::stop_
   const auto status_result = control_remotely(controls, options, std::move(stop));
   if (!status_result) return fail(status_result.error());
   const auto& status = *status_result;
-  const nlohmann::json json{{"bag", status.bag()},       {"state", status.state()},       {"paused", status.paused()},
-                            {"loop", status.loop()},     {"rate", status.rate()},         {"time", status.time()},
-                            {"start", status.start()},   {"end", status.end()},           {"bag_time", status.bag_time()},
-                            {"passes", status.passes()}, {"messages", status.messages()}};
+  const nlohmann::json json{
+      {"bag", status.bag()},       {"state", status.state()},      {"paused", status.paused()},
+      {"loop", status.loop()},     {"rate", status.rate()},        {"time", status.time()},
+      {"start", status.start()},   {"end", status.end()},          {"bag_time", status.bag_time()},
+      {"passes", status.passes()}, {"messages", status.messages()}};
   fmt::print("{}\n", json.dump());
   return kExitOk;
 }
@@ -125,35 +128,48 @@ int main(int argc, char** argv) {
   PlayerOptions options;
   ProcessOptions process;
   auto* bag = app.add_option("bag", arguments.bag, "Folder of a bag, or one of its files");
-  app.add_option("topics", arguments.topics, "Globs of topics, such as '/robot/*'; * goes past slashes (default: all). Topics on\n"
-                                             "which somebody acts, such as /robot/command, only if one names them in full");
+  app.add_option("topics", arguments.topics,
+                 "Globs of topics, such as '/robot/*'; * goes past slashes (default: all). Topics on\n"
+                 "which somebody acts, such as /robot/command, only if one names them in full");
   app.add_option("--exclude", arguments.excluded, "Globs of topics to leave out");
   app.add_option("--remap", arguments.remaps, "/FROM:=/TO: play a topic under another name; may be given again");
   app.add_option("--rate", options.playback.rate, "Seconds of the bag per second")
-      ->capture_default_str()->check(CLI::Range(kSlowestRate, kFastestRate));
-  app.add_option("--start", arguments.start, "Begin so many seconds after the first message")->check(CLI::Range(0.0, kMostSeconds));
-  auto* duration = app.add_option("--duration", arguments.duration, "End after so many seconds of the bag")->check(CLI::Range(1e-9, kMostSeconds));
+      ->capture_default_str()
+      ->check(CLI::Range(kSlowestRate, kFastestRate));
+  app.add_option("--start", arguments.start, "Begin so many seconds after the first message")
+      ->check(CLI::Range(0.0, kMostSeconds));
+  auto* duration = app.add_option("--duration", arguments.duration, "End after so many seconds of the bag")
+                       ->check(CLI::Range(1e-9, kMostSeconds));
   app.add_flag("--loop", options.playback.loop, "Begin again at the end");
   app.add_flag("--paused", options.playback.paused, "Wait to be resumed");
-  auto* clock = app.add_option("--clock", options.clock, "Publish the bag's time on /clock, so often per second (default: 100)")
-      ->expected(0, 1)->check(CLI::Range(0.1, 1000.0));
+  auto* clock =
+      app.add_option("--clock", options.clock, "Publish the bag's time on /clock, so often per second (default: 100)")
+          ->expected(0, 1)
+          ->check(CLI::Range(0.1, 1000.0));
   auto* subscribers = app.add_option("--wait-for-subscribers", options.subscribers,
                                      "Begin once every topic has so many subscribers (default: 1)")
-      ->expected(0, 1)->check(CLI::Range(1, 1000));
+                          ->expected(0, 1)
+                          ->check(CLI::Range(1, 1000));
   app.add_option("--timeout", arguments.timeout, "Longest wait in seconds, for subscribers or for what --control asks")
-      ->capture_default_str()->check(CLI::Range(0.0, kMostSeconds));
-  auto* controls = app.add_option("--control", arguments.controls,
-                                  "Tell the playback of this domain what to do, one after the other, and show its state:\n"
-                                  "pause, resume, toggle, step, seek:SECONDS, rate:FACTOR, loop:0, loop:1, quit, status")
-      ->expected(1, -1)->excludes(bag);
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, kMostSeconds));
+  auto* controls =
+      app.add_option("--control", arguments.controls,
+                     "Tell the playback of this domain what to do, one after the other, and show its state:\n"
+                     "pause, resume, toggle, step, seek:SECONDS, rate:FACTOR, loop:0, loop:1, quit, status")
+          ->expected(1, -1)
+          ->excludes(bag);
   app.add_option("--json", arguments.json, "File for what was played, and how punctually");
   add_process_options(app, process);
-  app.footer(fmt::format("Keys: {}.\nExit codes: 0 played, 2 bad input or a damaged bag, 3 a part of the system failed, "
-                         "130 interrupted.", kKeyHelp));
+  app.footer(
+      fmt::format("Keys: {}.\nExit codes: 0 played, 2 bad input or a damaged bag, 3 a part of the system failed, "
+                  "130 interrupted.",
+                  kKeyHelp));
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (*clock && clock->results().front().empty()) options.clock = 100.0;
   if (*subscribers && subscribers->results().front().empty()) options.subscribers = 1;
-  if (!*bag && !*controls) return fail({Code::kInvalidArgument, "got no bag, wanted one, or --control; `jostle play --help` says more"});
+  if (!*bag && !*controls)
+    return fail({Code::kInvalidArgument, "got no bag, wanted one, or --control; `jostle play --help` says more"});
   die_with_parent(process.parent);
   const StopSignal signal;
   options.domain = process.domain;

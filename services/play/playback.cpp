@@ -154,7 +154,8 @@ void Playback::seek(std::chrono::nanoseconds offset) {
 
 Result<void> Playback::set_rate(double rate, TimePoint now) {
   if (!(rate >= kSlowestRate && rate <= kFastestRate)) {
-    return Error{Code::kInvalidArgument, fmt::format("rate: got {:g}, wanted {:g} to {:g}", rate, kSlowestRate, kFastestRate)};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("rate: got {:g}, wanted {:g} to {:g}", rate, kSlowestRate, kFastestRate)};
   }
   timeline_.set_rate(rate, now);
   return {};

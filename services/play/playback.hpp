@@ -19,15 +19,15 @@ namespace jostle::services {
 inline constexpr double kSlowestRate = 0.01, kFastestRate = 100.0;
 
 struct PlaybackOptions {
-  double rate = 1.0;                     ///< seconds of the bag per second, kSlowestRate to kFastestRate
-  std::chrono::nanoseconds start{0};     ///< where it begins, after the bag's first message; >= 0
+  double rate = 1.0;                                 ///< seconds of the bag per second, kSlowestRate to kFastestRate
+  std::chrono::nanoseconds start{0};                 ///< where it begins, after the bag's first message; >= 0
   std::optional<std::chrono::nanoseconds> duration;  ///< of the bag's time, > 0; else to the last message
   bool loop = false;
   bool paused = false;
-  std::vector<int> topics;               ///< indices of BagInfo::topics, at least one
-  std::vector<int> state_topics;         ///< of these, whose last message belongs to a moment
-  std::uint64_t memory = 64 << 20;       ///< bytes of messages read ahead
-  std::function<void()> on_news;         ///< advance() has something to do before its time; from another thread
+  std::vector<int> topics;          ///< indices of BagInfo::topics, at least one
+  std::vector<int> state_topics;    ///< of these, whose last message belongs to a moment
+  std::uint64_t memory = 64 << 20;  ///< bytes of messages read ahead
+  std::function<void()> on_news;    ///< advance() has something to do before its time; from another thread
 };
 
 /// Decides what goes out when; who sends it, and which clock runs, is its caller's business:
@@ -80,14 +80,14 @@ class Playback {
   void set_loop(bool loop) { options_.loop = loop; }
 
   State state() const;
-  std::chrono::nanoseconds at(TimePoint now) const;     ///< offset
+  std::chrono::nanoseconds at(TimePoint now) const;  ///< offset
   std::chrono::nanoseconds first() const { return std::chrono::nanoseconds(first_ - zero_); }
   std::chrono::nanoseconds last() const { return std::chrono::nanoseconds(last_ - zero_); }
   bag::Time time(TimePoint now) const { return zero_ + at(now).count(); }
   double rate() const { return timeline_.rate(); }
   bool loops() const { return options_.loop; }
   bool paused() const { return paused_; }
-  int passes() const { return passes_; }                ///< completed
+  int passes() const { return passes_; }  ///< completed
 
   /// Whether on_news was due by the deadline; for callers without a loop of events.
   bool wait(TimePoint deadline) { return ahead_.wait(deadline); }

@@ -28,9 +28,9 @@ using Clock = std::chrono::steady_clock;
 using jostle_msgs::msg::PlayControl;
 using jostle_msgs::msg::PlayStatus;
 
-constexpr auto kTick = 100ms;       // status, the line, a look at who is there
-constexpr auto kRateWindow = 1s;    // over which rates of topics are counted
-constexpr auto kLastSamples = 2s;   // for readers to receive them before writers go
+constexpr auto kTick = 100ms;      // status, the line, a look at who is there
+constexpr auto kRateWindow = 1s;   // over which rates of topics are counted
+constexpr auto kLastSamples = 2s;  // for readers to receive them before writers go
 constexpr std::size_t kRememberedControls = 64;
 constexpr std::size_t kWaitingControls = 256;
 
@@ -81,16 +81,21 @@ struct Others {
 
 std::shared_ptr<dds::EndpointWatch> watch_for(const std::shared_ptr<Others>& others) {
   return std::make_shared<dds::EndpointWatch>([others](const dds::Endpoint& endpoint) {
-    if (endpoint.kind == dds::Endpoint::Kind::kWriter && others->topics.contains(endpoint.topic)) others->found.put(endpoint.topic);
+    if (endpoint.kind == dds::Endpoint::Kind::kWriter && others->topics.contains(endpoint.topic))
+      others->found.put(endpoint.topic);
   });
 }
 
 const char* name_of(Playback::State state) {
   switch (state) {
-    case Playback::State::kSeeking: return "seeking";
-    case Playback::State::kPlaying: return "playing";
-    case Playback::State::kPaused: return "paused";
-    case Playback::State::kEnded: break;
+    case Playback::State::kSeeking:
+      return "seeking";
+    case Playback::State::kPlaying:
+      return "playing";
+    case Playback::State::kPaused:
+      return "paused";
+    case Playback::State::kEnded:
+      break;
   }
   return "ended";
 }
@@ -240,9 +245,10 @@ struct Player::Impl {
       const auto lacking = publisher->lacking(options.subscribers);
       if (lacking.empty()) return true;
       if (now >= end) {
-        return Error{Code::kUnavailable,
-                     fmt::format("got fewer than {} subscribers of {} within {:g} s in domain {}; remedy: --exclude, or a longer --timeout",
-                                 options.subscribers, fmt::join(lacking, ", "), seconds(options.timeout), participant->domain())};
+        return Error{Code::kUnavailable, fmt::format("got fewer than {} subscribers of {} within {:g} s in domain {}; "
+                                                     "remedy: --exclude, or a longer --timeout",
+                                                     options.subscribers, fmt::join(lacking, ", "),
+                                                     seconds(options.timeout), participant->domain())};
       }
       if (!std::exchange(said, true)) line.say("waits for subscribers of {}", fmt::join(lacking, ", "));
       attend("waiting", now);
@@ -327,8 +333,8 @@ Result<std::unique_ptr<Player>> Player::create(std::unique_ptr<bag::BagReader> r
   if (self.options.clock > 0) self.others->topics.insert(topics::kClock.name);
   self.status.bag(reader->info().path.string());
 
-  auto participant_result = dds::Participant::open(
-      {.name = "jostle_play", .domain = self.options.domain, .watch = watch_for(self.others)});
+  auto participant_result =
+      dds::Participant::open({.name = "jostle_play", .domain = self.options.domain, .watch = watch_for(self.others)});
   if (!participant_result) return participant_result.error();
   self.participant = *participant_result;
   self.publisher.emplace(*self.participant, plan.played);

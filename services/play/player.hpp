@@ -20,9 +20,9 @@
 namespace jostle::services {
 
 struct PlayerOptions {
-  PlaybackOptions playback;  ///< its topics and on_news are the player's to set
-  double clock = 0.0;        ///< /clock so often per second of the wall; 0: not at all
-  int subscribers = 0;       ///< begin once every topic has so many
+  PlaybackOptions playback;             ///< its topics and on_news are the player's to set
+  double clock = 0.0;                   ///< /clock so often per second of the wall; 0: not at all
+  int subscribers = 0;                  ///< begin once every topic has so many
   std::chrono::nanoseconds timeout{0};  ///< for them to come
   std::optional<int> domain;
 };
@@ -33,8 +33,8 @@ struct PlayReport {
   Lateness lateness;                              ///< when messages went out, against when they were due
   double seconds = 0.0;                           ///< since the first
   int passes = 0;
-  std::string reason;                             ///< played to its end, told to quit, interrupted
-  std::optional<Error> problem;                   ///< why it ended before
+  std::string reason;            ///< played to its end, told to quit, interrupted
+  std::optional<Error> problem;  ///< why it ended before
 };
 
 /// Everything of a playback that speaks to others. Publishes its status ten times a second,

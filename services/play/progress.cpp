@@ -22,8 +22,8 @@ std::string bar(const Progress& progress) {
 std::string progress_line(const Progress& progress, std::size_t width) {
   double total = 0.0;
   for (const auto& [topic, rate] : progress.topics) total += rate;
-  std::string line = fmt::format("{} {:5.1f}/{:.1f} s  x{:g}  {}{}  {:.0f}/s", bar(progress), progress.time, progress.end,
-                                 progress.rate, progress.state, progress.loop ? "  loop" : "", total);
+  std::string line = fmt::format("{} {:5.1f}/{:.1f} s  x{:g}  {}{}  {:.0f}/s", bar(progress), progress.time,
+                                 progress.end, progress.rate, progress.state, progress.loop ? "  loop" : "", total);
   auto topics = progress.topics;
   std::ranges::stable_sort(topics, std::ranges::greater(), &std::pair<std::string, double>::second);
   for (const auto& [topic, rate] : topics) {

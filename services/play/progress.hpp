@@ -10,7 +10,7 @@
 namespace jostle::services {
 
 struct Progress {
-  std::string state;  ///< one word
+  std::string state;                          ///< one word
   double time = 0.0, start = 0.0, end = 0.0;  ///< s after the bag's first message
   double rate = 1.0;
   bool loop = false;

@@ -39,9 +39,9 @@ class Publisher final : public Playback::Sink {
   /// Whether all readers had everything by the deadline.
   bool wait_until_received(TimePoint deadline) const;
 
-  std::uint64_t sent() const { return lateness_.count(); }     ///< moments not counted
-  std::uint64_t refused() const { return refused_; }           ///< by the middleware
-  std::map<std::string, std::uint64_t> messages() const;       ///< sent, by topic
+  std::uint64_t sent() const { return lateness_.count(); }  ///< moments not counted
+  std::uint64_t refused() const { return refused_; }        ///< by the middleware
+  std::map<std::string, std::uint64_t> messages() const;    ///< sent, by topic
   const Lateness& lateness() const { return lateness_; }
 
  private:

@@ -10,7 +10,9 @@ std::uint64_t memory_of(const bag::Message& message) { return sizeof message + m
 }  // namespace
 
 ReadAhead::ReadAhead(std::unique_ptr<bag::BagReader> reader, Options options)
-    : options_(std::move(options)), reader_(std::move(reader)), thread_([this](const std::stop_token& stop) { work(stop); }) {}
+    : options_(std::move(options)),
+      reader_(std::move(reader)),
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
 ReadAhead::~ReadAhead() = default;
 
@@ -68,7 +70,9 @@ bool ReadAhead::has_news() const { return answered_ == asked_ && (moment_ || !me
 void ReadAhead::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (true) {
-    const auto has_work = [this] { return answered_ != asked_ || (answered_ > 0 && !done_ && held_ < options_.memory); };
+    const auto has_work = [this] {
+      return answered_ != asked_ || (answered_ > 0 && !done_ && held_ < options_.memory);
+    };
     if (!changed_.wait(lock, stop, has_work)) return;
     const bool is_news = answered_ != asked_ ? restart(lock) : fetch(lock);
     if (!is_news) continue;

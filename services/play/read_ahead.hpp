@@ -26,10 +26,10 @@ namespace jostle::services {
 class ReadAhead {
  public:
   struct Options {
-    std::vector<int> topics;        ///< indices of BagInfo::topics, at least one
-    std::vector<int> state_topics;  ///< of these, whose last messages make a moment
+    std::vector<int> topics;          ///< indices of BagInfo::topics, at least one
+    std::vector<int> state_topics;    ///< of these, whose last messages make a moment
     std::uint64_t memory = 64 << 20;  ///< bytes of messages to hold; one message more is held
-    std::function<void()> on_news;  ///< something new can be taken; must be quick
+    std::function<void()> on_news;    ///< something new can be taken; must be quick
   };
 
   ReadAhead(std::unique_ptr<bag::BagReader> reader, Options options);
@@ -46,8 +46,8 @@ class ReadAhead {
   const bag::Message* peek();
   void pop();
 
-  bool at_end();                  ///< no message will follow
-  std::optional<Error> problem(); ///< why none will follow, if the bag is damaged there
+  bool at_end();                   ///< no message will follow
+  std::optional<Error> problem();  ///< why none will follow, if the bag is damaged there
 
   /// Whether take_moment(), peek(), at_end() or problem() has something to say by the deadline.
   bool wait(std::chrono::steady_clock::time_point deadline);

@@ -18,8 +18,10 @@ using Statuses = dds::Inbox<PlayStatus>;
 constexpr auto kRepeat = 200ms;  // until answered: a reader that was just found may miss a sample
 
 Error no_playback(const RemoteOptions& options, int domain) {
-  return {Code::kUnavailable, fmt::format("got no answer from a playback in domain {} within {:g} s; remedy: --domain, or `jostle play BAG`",
-                                          domain, std::chrono::duration<double>(options.timeout).count())};
+  return {
+      Code::kUnavailable,
+      fmt::format("got no answer from a playback in domain {} within {:g} s; remedy: --domain, or `jostle play BAG`",
+                  domain, std::chrono::duration<double>(options.timeout).count())};
 }
 
 std::uint64_t random_id() {
@@ -33,7 +35,8 @@ bool is_done(const PlayStatus& status, const PlayControl& control) {
 
 }  // namespace
 
-Result<PlayStatus> control_remotely(const std::vector<Control>& controls, const RemoteOptions& options, std::stop_token stop) {
+Result<PlayStatus> control_remotely(const std::vector<Control>& controls, const RemoteOptions& options,
+                                    std::stop_token stop) {
   const auto participant_result = dds::Participant::open({.name = "jostle_play_control", .domain = options.domain});
   if (!participant_result) return participant_result.error();
   const int domain = participant_result->domain();

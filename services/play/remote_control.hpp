@@ -25,7 +25,7 @@ struct RemoteOptions {
 /// Errors   kUnavailable      no playback there, or no answer in time
 ///          kInvalidArgument  what the playback refused
 ///          kCancelled, those of Participant::open
-Result<jostle_msgs::msg::PlayStatus> control_remotely(const std::vector<Control>& controls, const RemoteOptions& options,
-                                                      std::stop_token stop);
+Result<jostle_msgs::msg::PlayStatus> control_remotely(const std::vector<Control>& controls,
+                                                      const RemoteOptions& options, std::stop_token stop);
 
 }  // namespace jostle::services

@@ -35,7 +35,7 @@ class Timeline {
   double rate() const { return rate_; }
 
  private:
-  bag::Time moment_;   // at since_, or for as long as it stands
+  bag::Time moment_;  // at since_, or for as long as it stands
   double rate_;
   bool runs_ = false;
   TimePoint since_{};

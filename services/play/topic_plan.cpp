@@ -17,13 +17,17 @@ namespace {
 
 // Topics of ROS 2 packages end in these where they command.
 constexpr std::array<std::string_view, 12> kCommandWords{
-    "command", "commands",        "cmd",  "cmd_vel", "cmd_vel_stamped", "goal", "goal_pose",
+    "command", "commands",         "cmd",     "cmd_vel",     "cmd_vel_stamped", "goal", "goal_pose",
     "cancel",  "joint_trajectory", "trigger", "initialpose", "emergency_stop"};
 
 // Whole packages end in a slash.
-constexpr std::array<std::string_view, 7> kCommandTypes{
-    "jostle_msgs/msg/VelocityCommand", "jostle_msgs/msg/Goal",           "jostle_msgs/msg/Cancel",  "trajectory_msgs/msg/",
-    "geometry_msgs/msg/Twist",         "geometry_msgs/msg/TwistStamped", "control_msgs/msg/"};
+constexpr std::array<std::string_view, 7> kCommandTypes{"jostle_msgs/msg/VelocityCommand",
+                                                        "jostle_msgs/msg/Goal",
+                                                        "jostle_msgs/msg/Cancel",
+                                                        "trajectory_msgs/msg/",
+                                                        "geometry_msgs/msg/Twist",
+                                                        "geometry_msgs/msg/TwistStamped",
+                                                        "control_msgs/msg/"};
 
 std::string last_word(const std::string& topic) { return topic.substr(topic.rfind('/') + 1); }
 
@@ -70,7 +74,9 @@ Result<std::pair<std::string, std::string>> parse_remap(const std::string& text)
   const std::size_t middle = text.find(":=");
   if (middle != std::string::npos) {
     std::pair remap{text.substr(0, middle), text.substr(middle + 2)};
-    const auto is_topic = [](const std::string& name) { return name.size() > 1 && name.front() == '/' && name.back() != '/'; };
+    const auto is_topic = [](const std::string& name) {
+      return name.size() > 1 && name.front() == '/' && name.back() != '/';
+    };
     if (is_topic(remap.first) && is_topic(remap.second)) return remap;
   }
   return Error{Code::kInvalidArgument, fmt::format("--remap: got '{}', wanted /FROM:=/TO", text)};
@@ -90,7 +96,8 @@ bool commands_somebody(const bag::Topic& topic) {
 Result<TopicPlan> plan_topics(const bag::BagInfo& bag, const TopicChoice& choice) {
   for (const auto& [from, to] : choice.remaps) {
     if (std::ranges::count(bag.topics, from, name_of) > 0) continue;
-    return Error{Code::kInvalidArgument, fmt::format("--remap: {} has no topic {}; it has {}", bag.path.string(), from, names_of(bag))};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("--remap: {} has no topic {}; it has {}", bag.path.string(), from, names_of(bag))};
   }
   TopicPlan plan;
   std::map<std::string, std::string> types;  // by name when played
@@ -109,7 +116,8 @@ Result<TopicPlan> plan_topics(const bag::BagInfo& bag, const TopicChoice& choice
     const auto [known, is_new] = types.try_emplace(name, topic.type);
     if (!is_new && known->second != topic.type) {
       return Error{Code::kInvalidArgument,
-                   fmt::format("{}: got types {} and {}, wanted one; remedy: leave out one, or --remap", name, known->second, topic.type)};
+                   fmt::format("{}: got types {} and {}, wanted one; remedy: leave out one, or --remap", name,
+                               known->second, topic.type)};
     }
     plan.played.push_back({.topic = static_cast<int>(i),
                            .name = name,
@@ -118,7 +126,8 @@ Result<TopicPlan> plan_topics(const bag::BagInfo& bag, const TopicChoice& choice
   }
   if (!plan.played.empty()) return plan;
   std::string reason = fmt::format("{}: no topic to play; it has {}", bag.path.string(), names_of(bag));
-  if (!plan.commands.empty()) reason += fmt::format("; {} commands somebody and must be named in full", plan.commands.front());
+  if (!plan.commands.empty())
+    reason += fmt::format("; {} commands somebody and must be named in full", plan.commands.front());
   if (!plan.impossible.empty()) reason += "; " + plan.impossible.front();
   return Error{Code::kInvalidArgument, reason};
 }

@@ -14,9 +14,9 @@
 namespace jostle::services {
 
 struct TopicChoice {
-  Selection selection;  ///< by the names in the bag
+  Selection selection;                                      ///< by the names in the bag
   std::vector<std::pair<std::string, std::string>> remaps;  ///< name in the bag, name when played
-  bool with_clock = false;  ///< /clock shows the bag's time: a recorded one is left out
+  bool with_clock = false;                                  ///< /clock shows the bag's time: a recorded one is left out
 };
 
 /// "/from:=/to". Error kInvalidArgument.
@@ -33,9 +33,9 @@ struct PlayedTopic {
 };
 
 struct TopicPlan {
-  std::vector<PlayedTopic> played;     ///< in the order of the bag
-  std::vector<std::string> commands;   ///< left out, see plan_topics
-  std::vector<std::string> impossible; ///< left out: name and reason
+  std::vector<PlayedTopic> played;      ///< in the order of the bag
+  std::vector<std::string> commands;    ///< left out, see plan_topics
+  std::vector<std::string> impossible;  ///< left out: name and reason
 };
 
 /// Whether somebody who hears a topic acts: moves a robot, takes up a goal, works for a pool.

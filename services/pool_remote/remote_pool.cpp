@@ -37,8 +37,8 @@ bool fits(const RolloutBatch& batch, const RolloutOutcome& outcome) {
   const auto steps = static_cast<std::uint32_t>(batch.nominal.steps());
   const bool waited = batch.wait && outcome.steps == 0;
   const bool whole = outcome.end != End::kCompleted || outcome.steps == steps || waited;
-  const bool may_win = outcome.end == End::kSucceeded ||
-                       (outcome.end == End::kCompleted && outcome.cost < batch.incumbent);
+  const bool may_win =
+      outcome.end == End::kSucceeded || (outcome.end == End::kCompleted && outcome.cost < batch.incumbent);
   const bool has_states = outcome.trajectory.size() == outcome.steps + std::size_t{1};
   const bool right_sizes = std::ranges::all_of(outcome.trajectory, [&](const State& x) {
     return x.q.size() == batch.x0.q.size() && x.v.size() == batch.x0.v.size();
@@ -85,7 +85,8 @@ RemotePool::RemotePool(const dds::Participant& participant, const RemotePoolOpti
                           const std::lock_guard lock(mutex_);
                           heartbeats_.push_back(heartbeat);
                           // Those of hundreds of workers, thousands a second, are absorbed several at a time.
-                          if (heartbeat.capacity() == 0 || std::chrono::steady_clock::now() > last_turn_ + kTogether) kick();
+                          if (heartbeat.capacity() == 0 || std::chrono::steady_clock::now() > last_turn_ + kTogether)
+                            kick();
                         }),
       dispatcher_([this](std::stop_token stop) { dispatch(stop); }) {}
 
@@ -142,12 +143,12 @@ class RemotePool::Underway final : public Ticket {
 };
 
 Result<std::unique_ptr<physics_pool::AsyncPool::Ticket>> RemotePool::submit(const RolloutBatch& batch,
-                                                                             OnReply on_reply) {
+                                                                            OnReply on_reply) {
   const std::lock_guard lock(mutex_);
   const auto world = worlds_.find(batch.world);
   if (world == worlds_.end()) {
-    return Error{Code::kUnknownWorld, fmt::format("world: got {}, wanted one given to load() before",
-                                                  to_string(batch.world))};
+    return Error{Code::kUnknownWorld,
+                 fmt::format("world: got {}, wanted one given to load() before", to_string(batch.world))};
   }
   const auto& [layout, time_step] = world->second;
   if (auto ok = physics_pool::validate(batch, layout, time_step); !ok) return ok.error();
@@ -169,9 +170,8 @@ Result<std::unique_ptr<physics_pool::AsyncPool::Ticket>> RemotePool::submit(cons
 
 Error RemotePool::no_worker() const {
   const double seconds = std::chrono::duration<double>(options_.no_worker_timeout).count();
-  std::string message =
-      fmt::format("no {} for {:g} s on domain {}; start one with `jostle worker`",
-                  ever_heard_ ? "usable worker" : "worker heard", seconds, participant_.domain());
+  std::string message = fmt::format("no {} for {:g} s on domain {}; start one with `jostle worker`",
+                                    ever_heard_ ? "usable worker" : "worker heard", seconds, participant_.domain());
   if (!last_refusal_.empty()) message += fmt::format(" (last trouble: {})", last_refusal_);
   return {Code::kUnavailable, std::move(message)};
 }
@@ -242,9 +242,7 @@ void RemotePool::absorb_heartbeats(TimePoint now, std::vector<WorkerId>& strange
   for (const msg::WorkerHeartbeat& heartbeat : std::exchange(heartbeats_, {})) {
     const auto writer = task_writers_.find(heartbeat.worker());
     if (writer == task_writers_.end()) strangers.push_back(heartbeat.worker());
-    const auto us = std::ranges::find(heartbeat.clients(), client_, [](const auto& load) {
-      return load.client();
-    });
+    const auto us = std::ranges::find(heartbeat.clients(), client_, [](const auto& load) { return load.client(); });
     const bool hears_us = us != heartbeat.clients().end();
     std::uint64_t others = 0;
     for (const msg::ClientLoad& load : heartbeat.clients()) others += load.client() == client_ ? 0 : load.samples();
@@ -302,8 +300,7 @@ void RemotePool::absorb(const Received& received, TimePoint now) {
   if (!outcome_result || !fits(active->batch, *outcome_result)) {
     // Others may do better; the batch is given up when nobody is left.
     last_refusal_ = fmt::format("worker {:016x}: {}", result.worker(),
-                                outcome_result ? "its result does not fit the batch"
-                                               : outcome_result.error().message);
+                                outcome_result ? "its result does not fit the batch" : outcome_result.error().message);
     scheduler_.bench(result.worker(), now);
     return;
   }
@@ -360,9 +357,8 @@ physics_pool::PoolStatus RemotePool::status() const {
 
 bool RemotePool::wait_for_workers(int count, TimePoint deadline) const {
   std::unique_lock lock(mutex_);
-  return changed_.wait_until(lock, deadline, [&] {
-    return scheduler_.usable_workers(std::chrono::steady_clock::now()) >= count;
-  });
+  return changed_.wait_until(lock, deadline,
+                             [&] { return scheduler_.usable_workers(std::chrono::steady_clock::now()) >= count; });
 }
 
 }  // namespace jostle::services

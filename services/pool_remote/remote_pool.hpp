@@ -86,13 +86,13 @@ class RemotePool final : public physics_pool::AsyncPool {
   const RemotePoolOptions options_;
   const std::uint64_t client_;
 
-  mutable std::mutex mutex_;  // guards everything down to kicked_
+  mutable std::mutex mutex_;                     // guards everything down to kicked_
   mutable std::condition_variable_any changed_;  // workers came or went
   std::condition_variable_any wake_;             // of the dispatcher
   Scheduler scheduler_;
   Epoch last_epoch_;
   std::unordered_map<Hash, std::pair<StateLayout, double>> worlds_;  // and their time steps, s
-  std::map<Epoch, std::shared_ptr<Active>> active_;  // shared with its ticket
+  std::map<Epoch, std::shared_ptr<Active>> active_;                  // shared with its ticket
   std::vector<Received> results_;
   std::vector<jostle_msgs::msg::WorkerHeartbeat> heartbeats_;
   Outgoing outgoing_;

@@ -10,15 +10,15 @@ using physics_pool::Priority;
 
 namespace {
 
-constexpr int kLargestCapacity = 1024;  // threads of one process; more is a broken heartbeat
-constexpr int kSpare = 1;               // samples a worker holds beyond what it can run
-constexpr double kNews = 0.1;           // weight of one more in what is typical
+constexpr int kLargestCapacity = 1024;                  // threads of one process; more is a broken heartbeat
+constexpr int kSpare = 1;                               // samples a worker holds beyond what it can run
+constexpr double kNews = 0.1;                           // weight of one more in what is typical
 constexpr std::chrono::duration<double> kCover{0.004};  // an exchange with a worker on a busy machine
-constexpr double kMostCover = 16.0;     // samples per thread, however short
-constexpr std::uint64_t kUrgentInARow = 7;  // samples, while a normal batch has some to hand out
-constexpr std::uint8_t kCopies = 2;     // of one sample at a time
-constexpr double kSlow = 2.0;           // times the typical time: worth a copy
-constexpr int kEmptyHeartbeats = 2;     // the first may have crossed a task on its way
+constexpr double kMostCover = 16.0;                     // samples per thread, however short
+constexpr std::uint64_t kUrgentInARow = 7;              // samples, while a normal batch has some to hand out
+constexpr std::uint8_t kCopies = 2;                     // of one sample at a time
+constexpr double kSlow = 2.0;                           // times the typical time: worth a copy
+constexpr int kEmptyHeartbeats = 2;                     // the first may have crossed a task on its way
 
 }  // namespace
 
@@ -32,8 +32,7 @@ void Scheduler::heard(const WorkerNews& news, TimePoint now) {
   if (!worker.status.alive) return take_back(worker, now);
   worker.status.capacity = std::clamp(news.capacity, 1, kLargestCapacity);
 
-  const bool waiting = !worker.outstanding.empty() &&
-                       worker.outstanding.front().since + options_.lost_after < now;
+  const bool waiting = !worker.outstanding.empty() && worker.outstanding.front().since + options_.lost_after < now;
   worker.empty_heartbeats = waiting && news.samples == 0 ? worker.empty_heartbeats + 1 : 0;
   if (worker.empty_heartbeats >= kEmptyHeartbeats) take_back(worker, now - options_.lost_after);
 }
@@ -68,10 +67,8 @@ int Scheduler::usable_workers(TimePoint now) const {
 }
 
 void Scheduler::start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples, Priority priority) {
-  batches_[epoch] = {.priority = priority,
-                     .first_sample = first_sample,
-                     .samples = std::vector<Sample>(samples),
-                     .missing = samples};
+  batches_[epoch] = {
+      .priority = priority, .first_sample = first_sample, .samples = std::vector<Sample>(samples), .missing = samples};
 }
 
 bool Scheduler::finish(Epoch epoch) {
@@ -105,8 +102,7 @@ bool Scheduler::accept(WorkerId id, Epoch epoch, std::uint32_t sample, std::uint
   }
   const auto batch = batches_.find(epoch);
   const std::uint32_t index = batch == batches_.end() ? 0 : sample - batch->second.first_sample;
-  if (batch == batches_.end() || index >= batch->second.samples.size() ||
-      batch->second.samples[index].done) {
+  if (batch == batches_.end() || index >= batch->second.samples.size() || batch->second.samples[index].done) {
     ++duplicates_;
     return false;
   }
@@ -131,9 +127,8 @@ void Scheduler::drop_above(Epoch epoch, std::uint32_t sample) {
     --batch.missing;
   }
   for (auto& [id, worker] : workers_) {
-    std::erase_if(worker.outstanding, [&](const Outstanding& entry) {
-      return entry.epoch == epoch && entry.sample > sample;
-    });
+    std::erase_if(worker.outstanding,
+                  [&](const Outstanding& entry) { return entry.epoch == epoch && entry.sample > sample; });
   }
 }
 
@@ -231,7 +226,8 @@ std::vector<Scheduler::Copyable> Scheduler::copyable(TimePoint now) const {
       const Batch& batch = batches_.at(entry.epoch);
       const Sample& sample = batch.samples[entry.sample - batch.first_sample];
       if (sample.done || sample.copies >= kCopies) continue;
-      found.push_back({.runs = runs, .since = entry.since, .choice = {.epoch = entry.epoch, .sample = entry.sample}, .holder = id});
+      found.push_back(
+          {.runs = runs, .since = entry.since, .choice = {.epoch = entry.epoch, .sample = entry.sample}, .holder = id});
     }
   }
   std::ranges::stable_sort(found, {}, [](const Copyable& copy) { return std::pair(copy.runs, copy.since); });
@@ -239,7 +235,8 @@ std::vector<Scheduler::Copyable> Scheduler::copyable(TimePoint now) const {
 }
 
 bool Scheduler::idle(const Worker& worker, TimePoint now) const {
-  return usable(worker, now) && worker.outstanding.size() + worker.others < static_cast<std::size_t>(worker.status.capacity);
+  return usable(worker, now) &&
+         worker.outstanding.size() + worker.others < static_cast<std::size_t>(worker.status.capacity);
 }
 
 // The list is made once: with hundreds of idle workers at the end of a batch, one search
@@ -266,8 +263,8 @@ void Scheduler::give(WorkerId id, Worker& worker, const Choice& choice, TimePoin
     return candidate.worker == id && candidate.epoch == choice.epoch;
   });
   if (assignment == assignments.end()) {
-    assignment = assignments.insert(
-        assignments.end(), {.worker = id, .epoch = choice.epoch, .attempt = sample.attempts});
+    assignment =
+        assignments.insert(assignments.end(), {.worker = id, .epoch = choice.epoch, .attempt = sample.attempts});
   }
   assignment->samples.push_back(choice.sample);
   ++sample.copies;

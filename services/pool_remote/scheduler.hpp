@@ -106,10 +106,10 @@ class Scheduler {
   struct Worker {
     physics_pool::WorkerStatus status;
     bool ready = false;
-    std::uint64_t others = 0;              // other clients' samples, at the last heartbeat
+    std::uint64_t others = 0;  // other clients' samples, at the last heartbeat
     TimePoint last_heard;
     TimePoint benched_until;
-    int empty_heartbeats = 0;             // in a row, though samples are outstanding
+    int empty_heartbeats = 0;              // in a row, though samples are outstanding
     std::vector<Outstanding> outstanding;  // oldest first
   };
   struct Sample {
@@ -121,8 +121,8 @@ class Scheduler {
     physics_pool::Priority priority = physics_pool::Priority::kNormal;
     std::uint32_t first_sample = 0;
     std::vector<Sample> samples;
-    std::uint32_t next = 0;               // index of the lowest never handed out
-    std::set<std::uint32_t> returned;     // indices handed out and lost
+    std::uint32_t next = 0;            // index of the lowest never handed out
+    std::set<std::uint32_t> returned;  // indices handed out and lost
     std::uint32_t missing = 0;
   };
   /// One sample on its way to one worker.
@@ -149,15 +149,14 @@ class Scheduler {
   bool next_sample_of(physics_pool::Priority priority, Choice& choice);
   std::vector<Copyable> copyable(TimePoint now) const;
   void assign_copies(TimePoint now, std::vector<Assignment>& assignments);
-  void give(WorkerId id, Worker& worker, const Choice& choice, TimePoint now,
-            std::vector<Assignment>& assignments);
+  void give(WorkerId id, Worker& worker, const Choice& choice, TimePoint now, std::vector<Assignment>& assignments);
 
   SchedulerOptions options_;
   std::map<WorkerId, Worker> workers_;
   std::map<Epoch, Batch> batches_;
   Epoch last_served_ = 0;
-  std::uint64_t urgent_in_a_row_ = 0;  // samples handed out
-  std::chrono::duration<double> typical_{0.0};  // from handing out to coming back, lately
+  std::uint64_t urgent_in_a_row_ = 0;               // samples handed out
+  std::chrono::duration<double> typical_{0.0};      // from handing out to coming back, lately
   std::chrono::duration<double> typical_run_{0.0};  // of a sample, lately; 0: not known
   std::uint64_t reissued_ = 0;
   std::uint64_t duplicates_ = 0;

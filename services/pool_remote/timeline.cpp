@@ -10,9 +10,7 @@ namespace {
 using physics_pool::WorkerStatus;
 
 // worker-2 before worker-10.
-auto place_of(const std::string& worker, std::uint32_t thread) {
-  return std::tuple(worker.size(), worker, thread);
-}
+auto place_of(const std::string& worker, std::uint32_t thread) { return std::tuple(worker.size(), worker, thread); }
 using Place = decltype(place_of("", 0));
 
 double median_of(std::vector<double> values) {
@@ -59,7 +57,8 @@ Timeline timeline_of(const std::vector<SampleTrace>& traces, const std::vector<W
   Timeline timeline;
   std::map<Place, int> row_of;
   for (const WorkerStatus& worker : workers) {
-    for (int thread = 0; thread < worker.capacity; ++thread) row_of[place_of(worker.name, static_cast<std::uint32_t>(thread))] = 0;
+    for (int thread = 0; thread < worker.capacity; ++thread)
+      row_of[place_of(worker.name, static_cast<std::uint32_t>(thread))] = 0;
   }
   std::map<std::uint64_t, ClockOffset> clocks;
   for (const SampleTrace& trace : traces) {

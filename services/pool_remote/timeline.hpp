@@ -15,7 +15,7 @@ struct SampleTrace {
   std::uint64_t client = 0, worker = 0, epoch = 0;
   std::string worker_name;
   std::uint32_t thread = 0, sample = 0, attempt = 0;
-  bool first = true;  ///< false: its result came late or twice and was dropped
+  bool first = true;                                    ///< false: its result came late or twice and was dropped
   double sent = 0.0, received = 0.0;                    ///< task and result, client's clock
   double arrived = 0.0, started = 0.0, finished = 0.0;  ///< task and sample, worker's clock
 };
@@ -61,9 +61,9 @@ struct Timeline {
     bool first = true;
   };
 
-  std::vector<Row> rows;  ///< by worker, then thread
-  std::vector<Bar> bars;  ///< by row, then time
-  double length = 0.0;    ///< s from the first task sent to the last result received
+  std::vector<Row> rows;     ///< by worker, then thread
+  std::vector<Bar> bars;     ///< by row, then time
+  double length = 0.0;       ///< s from the first task sent to the last result received
   double efficiency = 0.0;   ///< busy of available time, all rows
   double clock_error = 0.0;  ///< s, of the worker whose clock is known worst
   double on_the_way = 0.0;   ///< s, median per sample: from sent to received, less the time at the worker

@@ -70,7 +70,6 @@ class Turns {
   };
   static void forget_idle(Class& group);
 
-
   std::map<physics_pool::Priority, Class> classes_;
   double virtual_time_ = 0.0;  // V, among classes
   std::uint64_t turn_ = 0;

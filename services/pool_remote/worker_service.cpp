@@ -38,13 +38,13 @@ std::string host_name() {
 Result<void> check_samples(const msg::Task& task) {
   const std::uint32_t first = task.batch().first_sample(), count = task.batch().samples();
   if (task.samples().empty() || task.samples().size() > count) {
-    return Error{Code::kInvalidArgument, fmt::format("task.samples: got {} of them, wanted 1 to {}",
-                                                     task.samples().size(), count)};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("task.samples: got {} of them, wanted 1 to {}", task.samples().size(), count)};
   }
   for (const std::uint32_t sample : task.samples()) {
     if (sample >= first && sample - first < count) continue;
-    return Error{Code::kInvalidArgument, fmt::format("task.samples: got {}, wanted {} to {}", sample,
-                                                     first, std::uint64_t{first} + count - 1)};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("task.samples: got {}, wanted {} to {}", sample, first, std::uint64_t{first} + count - 1)};
   }
   if (std::isnan(task.best_cost())) {
     return Error{Code::kInvalidArgument, "task.best_cost: got NaN, wanted a cost or +inf"};
@@ -66,8 +66,7 @@ WorkerService::WorkerService(const dds::Participant& participant, const WorkerOp
                     [this](const msg::WorldDescription& world) {
                       worlds_.announce({.high = world.high(), .low = world.low()}, world.scene());
                     }),
-      control_reader_(participant, topics::kPoolControl,
-                      [this](const msg::BatchControl& control) { obey(control); }),
+      control_reader_(participant, topics::kPoolControl, [this](const msg::BatchControl& control) { obey(control); }),
       task_reader_(participant, topics::pool_task(id_),
                    [this](const Task& task) {
                      const std::lock_guard lock(mutex_);
@@ -111,8 +110,7 @@ void WorkerService::examine(const Arrival& arrival) {
     if (std::chrono::steady_clock::now() - arrival.arrived > kWorldPatience) {
       return refuse(task, Error{Code::kUnknownWorld,
                                 fmt::format("world: got {}, whose text did not arrive in {} s on {}",
-                                            to_string(batch.world), kWorldPatience.count(),
-                                            topics::kPoolWorld.name)});
+                                            to_string(batch.world), kWorldPatience.count(), topics::kPoolWorld.name)});
     }
     const std::lock_guard lock(mutex_);
     arrivals_.push_back(arrival);
@@ -146,8 +144,8 @@ void WorkerService::accept(const Arrival& arrival, RolloutBatch batch, WorldPtr 
   running.run->signals.offer_cost(task.best_cost());
   running.run->signals.offer_success(task.first_success());
   for (const std::uint32_t sample : task.samples()) {
-    const Job job{.client = task.client(), .epoch = task.epoch(), .sample = sample,
-                  .priority = running.run->batch.priority};
+    const Job job{
+        .client = task.client(), .epoch = task.epoch(), .sample = sample, .priority = running.run->batch.priority};
     const Held held{.job = job, .attempt = task.attempt(), .sent = task.sent(), .arrived = arrival.arrived};
     if (running.samples.try_emplace(sample, held).second) {
       turns_.wait(job);
@@ -187,7 +185,8 @@ void WorkerService::feed() {
 // On the thread that simulated, which takes its next sample from here: no other
 // thread has to wake up in between.
 void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, const physics_pool::Shift& shift) {
-  const bool skipped = outcome.end == physics_pool::End::kSkipped;  // cancelled, or the client knows of the success that did it
+  const bool skipped =
+      outcome.end == physics_pool::End::kSkipped;  // cancelled, or the client knows of the success that did it
   std::unique_lock lock(mutex_);
   const Held held = release(batch, outcome.sample);
   lock.unlock();

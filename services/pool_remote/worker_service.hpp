@@ -21,8 +21,8 @@
 namespace jostle::services {
 
 struct WorkerOptions {
-  std::string name;  ///< as clients report it; empty: host and process id
-  int threads = 1;   ///< rollouts at a time; one per core is enough
+  std::string name;        ///< as clients report it; empty: host and process id
+  int threads = 1;         ///< rollouts at a time; one per core is enough
   std::vector<int> cores;  ///< of each simulating thread; empty: wherever the system likes
 };
 
@@ -87,7 +87,7 @@ class WorkerService {
   const int threads_;
   WorldStore worlds_;
 
-  mutable std::mutex mutex_;  // guards everything down to kicked_
+  mutable std::mutex mutex_;          // guards everything down to kicked_
   std::condition_variable_any wake_;  // of the serving thread
   std::deque<Arrival> arrivals_;
   Turns turns_;

@@ -16,14 +16,13 @@ namespace jostle::services {
 namespace {
 
 constexpr std::chrono::milliseconds kTick{50};
-constexpr std::chrono::milliseconds kFlush{400};     // and a tick: half a second at most
+constexpr std::chrono::milliseconds kFlush{400};        // and a tick: half a second at most
 constexpr std::chrono::milliseconds kAfterResult{300};  // the last words around a result
-constexpr std::uint64_t kLookAtDisk = 16 << 20;      // bytes written before the next look at the disk
+constexpr std::uint64_t kLookAtDisk = 16 << 20;         // bytes written before the next look at the disk
 
 // Reliable, as `ros2 topic pub` is: a best-effort reader misses what comes before it has found
 // the writer, even if the writer has found it.
 const dds::RawTopic kTrigger{"rt/record/trigger", "std_msgs::msg::dds_::Empty_", {.depth = dds::kKeepAll}};
-
 
 bag::Time wall_clock() {
   const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
@@ -64,8 +63,9 @@ class Recorder::OpenBag {
       topic.index = *index_result;
     }
     const auto begin = Clock::now();
-    auto written = writer_->write(topic.index, {.log_time = log_time, .publish_time = sample.publish_time, .sequence = ++topic.messages,
-                                               .data = sample.data});
+    auto written = writer_->write(
+        topic.index,
+        {.log_time = log_time, .publish_time = sample.publish_time, .sequence = ++topic.messages, .data = sample.data});
     worst_write_ = std::max(worst_write_, Clock::now() - begin);
     return written;
   }
@@ -100,8 +100,8 @@ Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher
   if (!subscriptions_result) return subscriptions_result.error();
   recorder->subscriptions_ = std::move(subscriptions_result).value();
   if (own.until_result && !recorder->hears_results()) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("--until-result: got a selection without {}, wanted one with it", recorder->result_topic())};
+    return Error{Code::kInvalidArgument, fmt::format("--until-result: got a selection without {}, wanted one with it",
+                                                     recorder->result_topic())};
   }
   // Samples wait in the queue meanwhile; and what failed so far has left no folder.
   auto ready = own.ring.count() > 0 ? recorder->await_triggers() : recorder->open_bag();
@@ -121,8 +121,8 @@ Result<void> Recorder::open_bag() {
 
 Result<void> Recorder::await_triggers() {
   try {
-    trigger_reader_ = std::make_unique<dds::RawReader>(subscriptions_->participant(), kTrigger,
-                                                       [this](std::span<const std::byte>, const dds::Origin&) { trigger(); });
+    trigger_reader_ = std::make_unique<dds::RawReader>(
+        subscriptions_->participant(), kTrigger, [this](std::span<const std::byte>, const dds::Origin&) { trigger(); });
     return {};
   } catch (const dds::SetupError& error) {
     return Error{Code::kUnavailable, error.what()};
@@ -257,7 +257,8 @@ void Recorder::forget_old(bag::Time now) {
     if (!old && !much) return;
     if (!old && !std::exchange(ring_short_, true)) {
       warn(fmt::format("the ring holds {:.1f} s, wanted {:.1f}: more does not fit into --max-memory",
-                       1e-9 * static_cast<double>(now - ring_.front().log_time), 1e-9 * static_cast<double>(options_.ring.count())));
+                       1e-9 * static_cast<double>(now - ring_.front().log_time),
+                       1e-9 * static_cast<double>(options_.ring.count())));
     }
     QueuedSample sample = std::move(ring_.front());
     ring_.pop_front();
@@ -313,8 +314,9 @@ Result<void> Recorder::check_disk() const {
   auto free_result = free_disk(options_.folder);
   if (!free_result) return free_result.error();
   if (*free_result >= options_.min_free) return {};
-  return Error{Code::kIo, fmt::format("{}: got {:.0f} MiB of free disk, wanted at least {:.0f}; make room, or say --min-free",
-                                      options_.folder.string(), mebibytes(*free_result), mebibytes(options_.min_free))};
+  return Error{Code::kIo,
+               fmt::format("{}: got {:.0f} MiB of free disk, wanted at least {:.0f}; make room, or say --min-free",
+                           options_.folder.string(), mebibytes(*free_result), mebibytes(options_.min_free))};
 }
 
 std::uint64_t Recorder::lost(int topic) const {
@@ -335,7 +337,8 @@ RecordStatus Recorder::status() const {
   if (bag_) status.worst_write = std::chrono::duration<double>(bag_->worst_write()).count();
   status.bytes = bag_ ? bag_->writer().bytes() : ring_bytes_;
   for (int topic = 0; topic < topics(); ++topic) status.lost += lost(topic);
-  status.topics = static_cast<int>(std::ranges::count_if(tallies_, [](const Tally& tally) { return tally.written > 0; }));
+  status.topics =
+      static_cast<int>(std::ranges::count_if(tallies_, [](const Tally& tally) { return tally.written > 0; }));
   if (auto free_result = free_disk(options_.folder)) status.free_disk = *free_result;
   return status;
 }
@@ -358,13 +361,16 @@ void Recorder::look_at_disk() {
 RecordReport Recorder::finish(std::string reason, std::optional<Error> failure) {
   trigger_reader_.reset();
   for (const auto& [topic, refusals] : subscriptions_->unmatched()) {
-    warn(fmt::format("{}: it has a writer and none of its messages came; got {} refusals by the middleware, wanted an offer "
-                     "that a plain reader takes (shared ownership, no partition)", topic, refusals));
+    warn(fmt::format(
+        "{}: it has a writer and none of its messages came; got {} refusals by the middleware, wanted an offer "
+        "that a plain reader takes (shared ownership, no partition)",
+        topic, refusals));
   }
   subscriptions_->close();
   for (const std::string& glob : options_.selection.topics) {
     bool found = false;
-    for (int topic = 0; topic < topics() && !found; ++topic) found = Selection{.topics = {glob}}.wants(subscriptions_->topic(topic).name);
+    for (int topic = 0; topic < topics() && !found; ++topic)
+      found = Selection{.topics = {glob}}.wants(subscriptions_->topic(topic).name);
     if (!found) warn(fmt::format("{}: no topic of that name that can be recorded was found", glob));
   }
   // What came before the end belongs to it; after a failed write it is counted as lost.
@@ -386,8 +392,8 @@ RecordReport Recorder::finish(std::string reason, std::optional<Error> failure) 
   if (!bag_) report.status.bytes = snapshot_bytes_;
   for (int topic = 0; topic < topics(); ++topic) {
     const auto place = static_cast<std::size_t>(topic);
-    report.topics[subscriptions_->topic(topic).name] = {.messages = place < tallies_.size() ? tallies_[place].written : 0,
-                                                        .lost = lost(topic)};
+    report.topics[subscriptions_->topic(topic).name] = {
+        .messages = place < tallies_.size() ? tallies_[place].written : 0, .lost = lost(topic)};
   }
   report.problem = failure ? failure : disk_problem_ ? disk_problem_ : snapshot_problem_;
   return report;

@@ -26,13 +26,13 @@ struct RecordOptions {
   std::filesystem::path folder;  ///< of the bag; with a ring, bags are FOLDER-1, FOLDER-2, … as far as they are free
   Selection selection;
   bag::BagOptions bag;
-  std::chrono::nanoseconds ring{0};       ///< keep so much, and write it when asked to; 0: write everything
-  std::uint64_t max_memory = 256 << 20;   ///< bytes of samples in memory, > 0
-  std::uint64_t min_free = 512 << 20;     ///< bytes on the disk; below, the recording ends, or the ring is not written
-  std::chrono::nanoseconds duration{0};   ///< the recording ends after it; 0: never by itself
-  bool until_result = false;              ///< it ends shortly after a task's result
+  std::chrono::nanoseconds ring{0};      ///< keep so much, and write it when asked to; 0: write everything
+  std::uint64_t max_memory = 256 << 20;  ///< bytes of samples in memory, > 0
+  std::uint64_t min_free = 512 << 20;    ///< bytes on the disk; below, the recording ends, or the ring is not written
+  std::chrono::nanoseconds duration{0};  ///< the recording ends after it; 0: never by itself
+  bool until_result = false;             ///< it ends shortly after a task's result
   std::optional<int> domain;
-  bag::Note note;                         ///< stored as "record"
+  bag::Note note;  ///< stored as "record"
 };
 
 struct TopicCount {
@@ -42,9 +42,9 @@ struct TopicCount {
 };
 
 struct RecordStatus {
-  double seconds = 0.0;         ///< since the start
-  std::uint64_t messages = 0;   ///< written, or in the ring
-  std::uint64_t bytes = 0;      ///< of the files, or of the ring
+  double seconds = 0.0;        ///< since the start
+  std::uint64_t messages = 0;  ///< written, or in the ring
+  std::uint64_t bytes = 0;     ///< of the files, or of the ring
   std::uint64_t lost = 0;
   std::uint64_t free_disk = 0;  ///< bytes
   int topics = 0;               ///< with messages
@@ -71,8 +71,8 @@ struct RecordReport {
 class Recorder {
  public:
   struct Watcher {
-    std::function<void(const std::string&)> on_warning;     ///< from any thread
-    std::function<void(const RecordStatus&)> on_progress;   ///< twice a second
+    std::function<void(const std::string&)> on_warning;             ///< from any thread
+    std::function<void(const RecordStatus&)> on_progress;           ///< twice a second
     std::function<void(const std::filesystem::path&)> on_snapshot;  ///< a bag of the ring is complete
   };
 
@@ -143,14 +143,14 @@ class Recorder {
 
   std::deque<Tally> tallies_;  // by topic
   std::uint64_t messages_ = 0;
-  std::uint64_t unchecked_ = 0;  // bytes since the disk was looked at
+  std::uint64_t unchecked_ = 0;        // bytes since the disk was looked at
   std::optional<Error> disk_problem_;  // less free than min_free
   std::optional<Error> snapshot_problem_;
   std::uint64_t snapshot_bytes_ = 0;
   std::vector<std::filesystem::path> bags_;
 
   std::unique_ptr<Subscriptions> subscriptions_;
-  std::unique_ptr<OpenBag> bag_;  // none with a ring
+  std::unique_ptr<OpenBag> bag_;                    // none with a ring
   std::unique_ptr<dds::RawReader> trigger_reader_;  // before the subscriptions' participant goes
 };
 

@@ -124,8 +124,8 @@ struct Subscriptions::Impl {
     if (!state) state = add(endpoint.topic, endpoint.type, endpoint.keyed);
     if (!state) return;
     if (state->wire_type != endpoint.type) {
-      return warn(endpoint.topic + endpoint.type,
-                  fmt::format("{}: got a second type {}, recorded is {}", *name, *dds::ros_type(endpoint.type), state->topic.type));
+      return warn(endpoint.topic + endpoint.type, fmt::format("{}: got a second type {}, recorded is {}", *name,
+                                                              *dds::ros_type(endpoint.type), state->topic.type));
     }
     const Grade grade = grade_of(endpoint.reliable, endpoint.latched);
     // What a reader asks for is what its writers will offer at least; better than nothing.
@@ -148,13 +148,15 @@ struct Subscriptions::Impl {
     state->wire_type = wire_type;
     state->topic = {.name = *dds::ros_topic(wire_name), .type = *dds::ros_type(wire_type), .qos = {}, .definition = {}};
     if (!dds::can_be_raw(wire_type, keyed)) {
-      warn(wire_name + wire_type, fmt::format("{}: type {} {}, and only types of this system can be recorded so; left out",
-                                              state->topic.name, state->topic.type, keyed ? "has a key" : "should have a key"));
+      warn(wire_name + wire_type,
+           fmt::format("{}: type {} {}, and only types of this system can be recorded so; left out", state->topic.name,
+                       state->topic.type, keyed ? "has a key" : "should have a key"));
       return nullptr;
     }
     auto definition = options.definition(state->topic.type);
     if (!definition) {
-      warn(wire_name + wire_type, fmt::format("{}: the definition of type {} is unknown; left out", state->topic.name, state->topic.type));
+      warn(wire_name + wire_type,
+           fmt::format("{}: the definition of type {} is unknown; left out", state->topic.name, state->topic.type));
       return nullptr;
     }
     state->topic.definition = *std::move(definition);
@@ -165,17 +167,19 @@ struct Subscriptions::Impl {
   }
 
   void read(TopicState& state, Grade grade) {
-    const dds::Qos qos{.reliable = grade != kBestEffort, .latched = grade == kLatched, .depth = dds::kKeepAll,
+    const dds::Qos qos{.reliable = grade != kBestEffort,
+                       .latched = grade == kLatched,
+                       .depth = dds::kKeepAll,
                        .instances = state.system ? state.topic.qos.instances : 1};
-    state.readers[grade] = std::make_unique<dds::RawReader>(
-        *participant, dds::RawTopic{state.wire_name, state.wire_type, qos},
-        [this, &state](std::span<const std::byte> bytes, const dds::Origin& origin) {
-          {
-            const std::lock_guard lock(state.mutex);
-            if (!state.seen[origin.writer].insert(origin.sequence)) return;
-          }
-          options.on_sample(state.index, bytes, origin);
-        });
+    state.readers[grade] =
+        std::make_unique<dds::RawReader>(*participant, dds::RawTopic{state.wire_name, state.wire_type, qos},
+                                         [this, &state](std::span<const std::byte> bytes, const dds::Origin& origin) {
+                                           {
+                                             const std::lock_guard lock(state.mutex);
+                                             if (!state.seen[origin.writer].insert(origin.sequence)) return;
+                                           }
+                                           options.on_sample(state.index, bytes, origin);
+                                         });
   }
 
   // While nobody makes readers.
@@ -184,7 +188,8 @@ struct Subscriptions::Impl {
     const std::lock_guard lock(mutex);
     std::vector<std::pair<std::string, std::uint64_t>> found_ones;
     for (const auto& state : states) {
-      const bool written = std::ranges::any_of(writers, [&](const auto& writer) { return writer.second == state->wire_name; });
+      const bool written =
+          std::ranges::any_of(writers, [&](const auto& writer) { return writer.second == state->wire_name; });
       int matched = 0;
       std::uint64_t refusals = 0;
       for (const auto& reader : state->readers) {
@@ -206,7 +211,7 @@ struct Subscriptions::Impl {
   mutable std::mutex mutex;  // guards all below but the readers
   std::condition_variable_any news;
   std::deque<Endpoint> found;
-  std::map<std::string, dds::Qos> offers;  // of the first writer, by the topic's name on the wire
+  std::map<std::string, dds::Qos> offers;    // of the first writer, by the topic's name on the wire
   std::map<dds::Guid, std::string> writers;  // there now; their topics, likewise
   std::deque<std::unique_ptr<TopicState>> states;
 
@@ -216,8 +221,9 @@ struct Subscriptions::Impl {
 
 Result<std::unique_ptr<Subscriptions>> Subscriptions::open(Options options) {
   auto impl = std::make_unique<Impl>(std::move(options));
-  const auto watch = std::make_shared<dds::EndpointWatch>([impl = impl.get()](const Endpoint& endpoint) { impl->note(endpoint); },
-                                                          [impl = impl.get()](const Endpoint& endpoint) { impl->forget(endpoint); });
+  const auto watch =
+      std::make_shared<dds::EndpointWatch>([impl = impl.get()](const Endpoint& endpoint) { impl->note(endpoint); },
+                                           [impl = impl.get()](const Endpoint& endpoint) { impl->forget(endpoint); });
   auto participant_result =
       dds::Participant::open({.name = "jostle_record", .domain = impl->options.domain, .watch = watch});
   if (!participant_result) return participant_result.error();

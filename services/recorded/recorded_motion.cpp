@@ -77,7 +77,8 @@ Result<std::vector<Moment>> follow_observations(const RecordedRun& run, const St
 // The last action and plan that a world time has seen.
 void count_decisions(const RecordedRun& run, double world, RecordedMotion::Sample& sample) {
   for (const auto& seen : run.observations) {
-    if (seen.number() > 0 && seconds(seen.header()) - seen.duration() < world) sample.action = static_cast<int>(seen.number());
+    if (seen.number() > 0 && seconds(seen.header()) - seen.duration() < world)
+      sample.action = static_cast<int>(seen.number());
   }
   for (const auto& plan : run.plans) {
     if (seconds(plan.header()) <= world) sample.plan = static_cast<int>(plan.number());
@@ -89,7 +90,8 @@ State between(const StateLayout& layout, const State& a, const State& b, double 
   for (std::size_t i = 0; i < x.q.size(); ++i) x.q[i] += share * (b.q[i] - a.q[i]);
   for (const ObjectSlot& object : layout.objects) {
     const auto w = static_cast<std::size_t>(object.q) + 3;
-    const Eigen::Quaterniond from(a.q[w], a.q[w + 1], a.q[w + 2], a.q[w + 3]), to(b.q[w], b.q[w + 1], b.q[w + 2], b.q[w + 3]);
+    const Eigen::Quaterniond from(a.q[w], a.q[w + 1], a.q[w + 2], a.q[w + 3]),
+        to(b.q[w], b.q[w + 1], b.q[w + 2], b.q[w + 3]);
     const Eigen::Quaterniond turned = from.slerp(share, to);
     x.q[w] = turned.w(), x.q[w + 1] = turned.x(), x.q[w + 2] = turned.y(), x.q[w + 3] = turned.z();
   }
@@ -98,21 +100,26 @@ State between(const StateLayout& layout, const State& a, const State& b, double 
 
 }  // namespace
 
-Result<RecordedMotion> RecordedMotion::read(bag::BagReader& reader, const RecordedRun& run, const StateLayout& layout, RunClock clock) {
+Result<RecordedMotion> RecordedMotion::read(bag::BagReader& reader, const RecordedRun& run, const StateLayout& layout,
+                                            RunClock clock) {
   auto moments_result = follow_states(reader, run, layout);
   if (moments_result && moments_result->empty()) moments_result = follow_observations(run, layout);
   if (!moments_result) {
-    return Error{moments_result.error().code, fmt::format("{}: {}", reader.info().path.string(), moments_result.error().message)};
+    return Error{moments_result.error().code,
+                 fmt::format("{}: {}", reader.info().path.string(), moments_result.error().message)};
   }
   const Moment first = moments_result->front();
   std::vector<Sample> samples;
   for (Moment& moment : *moments_result) {
-    const double time = clock == RunClock::kWorld ? moment.world - first.world : 1e-9 * static_cast<double>(moment.wall - first.wall);
+    const double time =
+        clock == RunClock::kWorld ? moment.world - first.world : 1e-9 * static_cast<double>(moment.wall - first.wall);
     if (!samples.empty() && time < samples.back().time) continue;  // of a world before
     Sample sample{.time = time, .state = {.q = std::move(moment.state.q)}};
     count_decisions(run, moment.world, sample);
-    if (!samples.empty() && time == samples.back().time) samples.back() = std::move(sample);
-    else samples.push_back(std::move(sample));
+    if (!samples.empty() && time == samples.back().time)
+      samples.back() = std::move(sample);
+    else
+      samples.push_back(std::move(sample));
   }
   return RecordedMotion(std::move(samples), layout);
 }

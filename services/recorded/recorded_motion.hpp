@@ -28,7 +28,8 @@ class RecordedMotion {
   /// From the robot's and the objects' states of a bag; from the run's observations where
   /// it has none of those.
   /// Errors   kInvalidArgument  a state that does not fit the scene; those of BagReader
-  static Result<RecordedMotion> read(bag::BagReader& reader, const RecordedRun& run, const StateLayout& layout, RunClock clock);
+  static Result<RecordedMotion> read(bag::BagReader& reader, const RecordedRun& run, const StateLayout& layout,
+                                     RunClock clock);
 
   double duration() const { return samples_.back().time; }  ///< s
 

@@ -19,8 +19,8 @@ std::vector<int> topics_of(const bag::BagInfo& info) {
   std::vector<int> topics;
   for (std::size_t i = 0; i < info.topics.size(); ++i) {
     const std::string& type = info.topics[i].topic.type;
-    if (type == "jostle_msgs/msg/TaskRun" || type == "jostle_msgs/msg/Observation" ||
-        type == "jostle_msgs/msg/Plan" || type == "jostle_msgs/msg/GoalResult") {
+    if (type == "jostle_msgs/msg/TaskRun" || type == "jostle_msgs/msg/Observation" || type == "jostle_msgs/msg/Plan" ||
+        type == "jostle_msgs/msg/GoalResult") {
       topics.push_back(static_cast<int>(i));
     }
   }
@@ -60,7 +60,8 @@ class Collector {
       });
     }
     if (type == "jostle_msgs/msg/Plan") {
-      return with<Plan>(message, [&](Plan plan) { parts_[plan.goal_id()].plans.try_emplace(plan.number(), std::move(plan)); });
+      return with<Plan>(message,
+                        [&](Plan plan) { parts_[plan.goal_id()].plans.try_emplace(plan.number(), std::move(plan)); });
     }
     return with<GoalResult>(message, [&](GoalResult result) {
       parts_[result.goal_id()].end = message.log_time;
@@ -70,9 +71,11 @@ class Collector {
 
   Result<std::vector<RecordedRun>> runs(const bag::BagInfo& info) const {
     if (order_.empty()) {
-      return Error{Code::kNotFound,
-                   fmt::format("{}: got {}, wanted a run with its observations and plans (/task/run, /task/observation, "
-                               "/task/plan); `jostle run --record` and `jostle record` record them", info.path.string(), names(info))};
+      return Error{
+          Code::kNotFound,
+          fmt::format("{}: got {}, wanted a run with its observations and plans (/task/run, /task/observation, "
+                      "/task/plan); `jostle run --record` and `jostle record` record them",
+                      info.path.string(), names(info))};
     }
     std::vector<RecordedRun> runs;
     for (const std::string& id : order_) {
@@ -111,7 +114,8 @@ class Collector {
 
   static Error missing(const std::string& where, const char* what, std::size_t number) {
     return {Code::kInvalidArgument,
-            fmt::format("{}: {} {} is missing, wanted all; `jostle bag info` says whether the recorder lost some", where, what, number)};
+            fmt::format("{}: {} {} is missing, wanted all; `jostle bag info` says whether the recorder lost some",
+                        where, what, number)};
   }
 
   std::map<std::string, Parts> parts_;  // by goal
@@ -145,7 +149,8 @@ Result<std::vector<RecordedRun>> read_runs(bag::BagReader& reader) {
     const bag::Message& message = **message_result;
     const bag::Topic& topic = reader.info().topics[static_cast<std::size_t>(message.topic)].topic;
     if (auto ok = collector.take(topic.type, message); !ok) {
-      return Error{ok.error().code, fmt::format("{}: {}: {}", reader.info().path.string(), topic.name, ok.error().message)};
+      return Error{ok.error().code,
+                   fmt::format("{}: {}: {}", reader.info().path.string(), topic.name, ok.error().message)};
     }
   }
   return collector.runs(reader.info());

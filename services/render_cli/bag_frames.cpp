@@ -18,8 +18,8 @@ Result<RecordedRun> only_run(bag::BagReader& reader, const std::string& goal) {
   if (runs_result->size() == 1) return std::move(runs_result->front());
   std::string ids;
   for (const RecordedRun& run : *runs_result) ids += (ids.empty() ? "" : ", ") + run.run.goal().goal_id();
-  return Error{Code::kInvalidArgument, fmt::format("{}: got {} runs, wanted --goal with one of {}", reader.info().path.string(),
-                                                   runs_result->size(), ids)};
+  return Error{Code::kInvalidArgument, fmt::format("{}: got {} runs, wanted --goal with one of {}",
+                                                   reader.info().path.string(), runs_result->size(), ids)};
 }
 
 std::string caption_of(const RecordedMotion::Sample& sample, const RecordedRun& run, bool last) {

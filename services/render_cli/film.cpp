@@ -31,7 +31,8 @@ Result<void> draw_each(const Frames& input, const DrawOptions& options, const st
   return {};
 }
 
-Result<void> draw_sheet(const Frames& input, const fs::path& output, const DrawOptions& options, const std::stop_token& stop) {
+Result<void> draw_sheet(const Frames& input, const fs::path& output, const DrawOptions& options,
+                        const std::stop_token& stop) {
   std::vector<Picture> pictures;
   std::vector<std::string> captions;
   for (const Frame& frame : input.frames) captions.push_back(frame.caption);
@@ -45,7 +46,8 @@ Result<void> draw_sheet(const Frames& input, const fs::path& output, const DrawO
   return physics_pool::write_png(output, *sheet_result);
 }
 
-Result<void> draw_sequence(const Frames& input, const fs::path& folder, const DrawOptions& options, const std::stop_token& stop) {
+Result<void> draw_sequence(const Frames& input, const fs::path& folder, const DrawOptions& options,
+                           const std::stop_token& stop) {
   std::error_code problem;
   fs::create_directories(folder, problem);
   if (problem) return Error{Code::kIo, fmt::format("{}: {}", folder.string(), problem.message())};
@@ -59,7 +61,8 @@ Result<void> draw_sequence(const Frames& input, const fs::path& folder, const Dr
 }
 
 std::vector<std::string> encoder_arguments(const fs::path& folder, const fs::path& output, double per_second) {
-  std::vector<std::string> words{"-y", "-loglevel", "error", "-framerate", fmt::format("{}", per_second), "-i", (folder / kPattern).string()};
+  std::vector<std::string> words{
+      "-y", "-loglevel", "error", "-framerate", fmt::format("{}", per_second), "-i", (folder / kPattern).string()};
   if (output.extension() == ".gif") {
     words.insert(words.end(), {"-vf", "split[a][b];[a]palettegen[p];[b][p]paletteuse"});
   } else {
@@ -71,14 +74,16 @@ std::vector<std::string> encoder_arguments(const fs::path& folder, const fs::pat
   return words;
 }
 
-Result<void> draw_film(const Frames& input, const fs::path& output, const DrawOptions& options, const std::stop_token& stop) {
+Result<void> draw_film(const Frames& input, const fs::path& output, const DrawOptions& options,
+                       const std::stop_token& stop) {
   auto folder_result = make_temporary_folder("film");
   if (!folder_result) return folder_result.error();
   std::error_code problem;
   if (output.has_parent_path()) fs::create_directories(output.parent_path(), problem);
   auto drawn = draw_sequence(input, *folder_result, options, stop);
   if (drawn) {
-    drawn = run_tool("ffmpeg", "ffmpeg", encoder_arguments(*folder_result, output, options.per_second), *folder_result / "log");
+    drawn = run_tool("ffmpeg", "ffmpeg", encoder_arguments(*folder_result, output, options.per_second),
+                     *folder_result / "log");
   }
   fs::remove_all(*folder_result, problem);
   return drawn;
@@ -93,7 +98,8 @@ Result<void> draw(const Frames& frames, const fs::path& output, const DrawOption
   if (is_sheet(output)) return draw_sheet(frames, output, options, stop);
   if (ending == ".mp4" || ending == ".gif") return draw_film(frames, output, options, stop);
   if (ending.empty()) return draw_sequence(frames, output, options, stop);
-  return Error{Code::kInvalidArgument, fmt::format("--output: got '{}', wanted .png, .mp4, .gif, or a folder", output.string())};
+  return Error{Code::kInvalidArgument,
+               fmt::format("--output: got '{}', wanted .png, .mp4, .gif, or a folder", output.string())};
 }
 
 }  // namespace jostle::services

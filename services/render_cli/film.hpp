@@ -29,7 +29,8 @@ struct DrawOptions {
 ///          kNotFound         ffmpeg is not installed
 ///          kIo               what cannot be written; ffmpeg's own words
 ///          kCancelled        a stop was requested; nothing is left behind
-Result<void> draw(const Frames& frames, const std::filesystem::path& output, const DrawOptions& options, std::stop_token stop);
+Result<void> draw(const Frames& frames, const std::filesystem::path& output, const DrawOptions& options,
+                  std::stop_token stop);
 
 /// Whether draw() makes a sheet of that.
 bool is_sheet(const std::filesystem::path& output);

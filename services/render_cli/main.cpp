@@ -33,7 +33,8 @@ bool parse_size(const std::string& text, physics_pool::RenderOptions& options) {
 
 Result<Frames> load(const Arguments& arguments) {
   if (arguments.input.extension() == ".json") return load_frames(arguments.input);
-  if (arguments.input.extension() == ".yaml" || arguments.input.extension() == ".yml") return load_start(arguments.input);
+  if (arguments.input.extension() == ".yaml" || arguments.input.extension() == ".yml")
+    return load_start(arguments.input);
   BagFramesOptions options = arguments.bag;
   options.clock = arguments.clock == "wall" ? RunClock::kWall : RunClock::kWorld;
   options.per_second = arguments.draw.per_second / arguments.speed;
@@ -56,23 +57,33 @@ Result<void> run(const Arguments& arguments, std::stop_token stop) {
 int main(int argc, char** argv) {
   using namespace jostle::services;
   Arguments arguments;
-  CLI::App app{"Draws states of a scene, or a recorded run, with captions: a PNG with all side by side, a folder of\n"
-               "PNGs, or a film (MP4, GIF).", "jostle render"};
-  app.add_option("input", arguments.input,
-                 "BAG with a recorded run; STATES.json with a scene and frames of {caption, q}; or SCENE.yaml for its start")->required();
-  app.add_option("-o,--output", arguments.output, "NAME.png, NAME.mp4, NAME.gif, or a folder for frame-00001.png, ...")->required();
+  CLI::App app{
+      "Draws states of a scene, or a recorded run, with captions: a PNG with all side by side, a folder of\n"
+      "PNGs, or a film (MP4, GIF).",
+      "jostle render"};
+  app.add_option(
+         "input", arguments.input,
+         "BAG with a recorded run; STATES.json with a scene and frames of {caption, q}; or SCENE.yaml for its start")
+      ->required();
+  app.add_option("-o,--output", arguments.output, "NAME.png, NAME.mp4, NAME.gif, or a folder for frame-00001.png, ...")
+      ->required();
   app.add_option("--columns", arguments.draw.columns, "of a PNG: pictures in a row")
-      ->check(CLI::Range(1, 100))->capture_default_str();
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
   app.add_option("--size", arguments.size, "WxH of each picture, pixels")->capture_default_str();
   app.add_option("--camera", arguments.draw.picture.camera, "overview or top")->capture_default_str();
   app.add_option("--fps", arguments.draw.per_second, "of a film or folder: pictures per second")
-      ->check(CLI::Range(0.1, 120.0))->capture_default_str();
-  app.add_option("--frames", arguments.bag.count, "of a bag: so many, evenly spread (default: 8 for a PNG, else by --fps)")
+      ->check(CLI::Range(0.1, 120.0))
+      ->capture_default_str();
+  app.add_option("--frames", arguments.bag.count,
+                 "of a bag: so many, evenly spread (default: 8 for a PNG, else by --fps)")
       ->check(CLI::Range(1, 100000));
   app.add_option("--speed", arguments.speed, "of a bag: run seconds per second of film")
-      ->check(CLI::Range(0.01, 1000.0))->capture_default_str();
+      ->check(CLI::Range(0.01, 1000.0))
+      ->capture_default_str();
   app.add_option("--clock", arguments.clock, "of a bag: world, which may stand still while a plan is made, or wall")
-      ->check(CLI::IsMember({"world", "wall"}))->capture_default_str();
+      ->check(CLI::IsMember({"world", "wall"}))
+      ->capture_default_str();
   app.add_option("--goal", arguments.bag.goal, "of a bag with several runs: which");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (!parse_size(arguments.size, arguments.draw.picture)) {

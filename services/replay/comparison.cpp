@@ -32,9 +32,12 @@ std::string decision_of(const Plan& plan) {
 }
 
 // The first entry of two controls that differs, `nu` to a step.
-void describe_controls(const std::vector<double>& recorded, const std::vector<double>& replayed, int nu, Difference& difference) {
+void describe_controls(const std::vector<double>& recorded, const std::vector<double>& replayed, int nu,
+                       Difference& difference) {
   if (recorded.size() != replayed.size()) {
-    const auto steps = [nu](std::size_t values) { return fmt::format("{} steps", values / static_cast<std::size_t>(std::max(nu, 1))); };
+    const auto steps = [nu](std::size_t values) {
+      return fmt::format("{} steps", values / static_cast<std::size_t>(std::max(nu, 1)));
+    };
     difference.field += ", length";
     difference.recorded = steps(recorded.size());
     difference.replayed = steps(replayed.size());
@@ -87,14 +90,16 @@ std::optional<Difference> compare_given(const Plan& a, const Plan& b) {
     return difference;
   }
   if (differs("iterations allowed", a.iterations_allowed(), b.iterations_allowed()) ||
-      differs("noise stream", a.stream(), b.stream()) || differs("hand to be cleared", a.clear_hand(), b.clear_hand())) {
+      differs("noise stream", a.stream(), b.stream()) ||
+      differs("hand to be cleared", a.clear_hand(), b.clear_hand())) {
     return difference;
   }
   return {};
 }
 
 std::optional<Difference> compare_made(const Plan& a, const Plan& b) {
-  Difference difference{.decision = decision_of(a), .given = "equal: start state, candidate, iterations allowed, noise stream"};
+  Difference difference{.decision = decision_of(a),
+                        .given = "equal: start state, candidate, iterations allowed, noise stream"};
   if (!same_bits(a.controls(), b.controls())) {
     difference.field = "controls";
     describe_controls(a.controls(), b.controls(), a.nu(), difference);
@@ -122,14 +127,16 @@ std::optional<Difference> compare_made(const Plan& a, const Plan& b) {
 
 std::optional<Difference> compare_action(const Observation& a, const Observation& b) {
   if (same_bits(a.command(), b.command()) && same_bits(a.duration(), b.duration())) return {};
-  Difference difference{.decision = fmt::format("action {}", a.number()), .field = "control",
+  Difference difference{.decision = fmt::format("action {}", a.number()),
+                        .field = "control",
                         .given = "equal: everything observed and planned before it"};
   if (same_bits(a.command(), b.command())) {
     difference.field = "duration";
     difference.recorded = number(a.duration(), "s");
     difference.replayed = number(b.duration(), "s");
   } else {
-    describe_controls(a.command(), b.command(), static_cast<int>(std::max(a.command().size(), b.command().size())), difference);
+    describe_controls(a.command(), b.command(), static_cast<int>(std::max(a.command().size(), b.command().size())),
+                      difference);
   }
   return difference;
 }
@@ -170,12 +177,15 @@ Comparison compare(const StateLayout& layout, const RecordedRun& recorded, const
   // In the order they were made: the action that led to an observation, then the plans that start from it.
   std::size_t plan = 0;
   const auto note = [&](std::optional<Difference> difference, std::size_t& equal) {
-    if (!difference) ++equal;
-    else if (!comparison.first) comparison.first = std::move(difference);
+    if (!difference)
+      ++equal;
+    else if (!comparison.first)
+      comparison.first = std::move(difference);
   };
   for (std::size_t i = 0; i < std::min(recorded.observations.size(), replayed.observations.size()); ++i) {
     if (i > 0) note(compare_action(recorded.observations[i], replayed.observations[i]), comparison.equal_actions);
-    for (; plan < std::min(recorded.plans.size(), replayed.plans.size()) && recorded.plans[plan].observation() <= i; ++plan) {
+    for (; plan < std::min(recorded.plans.size(), replayed.plans.size()) && recorded.plans[plan].observation() <= i;
+         ++plan) {
       note(compare(layout, recorded.plans[plan], replayed.plans[plan]), comparison.equal_plans);
     }
   }

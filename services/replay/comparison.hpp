@@ -14,8 +14,8 @@ namespace jostle::services {
 
 /// Where and how a decision parts from the recorded one.
 struct Difference {
-  std::string decision;  ///< "plan 3, after action 2", "action 4"
-  std::string field;     ///< "controls, step 1, y"; "iterations allowed"
+  std::string decision;            ///< "plan 3, after action 2", "action 4"
+  std::string field;               ///< "controls, step 1, y"; "iterations allowed"
   std::string recorded, replayed;  ///< with units
   /// What went into it: whether start, candidate and options of this decision were equal.
   std::string given;
@@ -31,9 +31,9 @@ struct Decisions {
 };
 
 struct Comparison {
-  std::size_t plans = 0, equal_plans = 0;      ///< of the recorded ones
+  std::size_t plans = 0, equal_plans = 0;  ///< of the recorded ones
   std::size_t actions = 0, equal_actions = 0;
-  std::optional<Difference> first;             ///< nothing: bit-equal
+  std::optional<Difference> first;  ///< nothing: bit-equal
 
   bool bit_equal() const { return !first; }
 };

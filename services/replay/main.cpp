@@ -37,7 +37,8 @@ Result<std::vector<RecordedRun>> load(const Arguments& arguments) {
 int perform(Arguments arguments, std::stop_token stop) {
   auto runs_result = load(arguments);
   if (!runs_result) return fail(runs_result.error());
-  if (!arguments.controller.empty()) arguments.options.settings.insert(arguments.options.settings.begin(), "controller=" + arguments.controller);
+  if (!arguments.controller.empty())
+    arguments.options.settings.insert(arguments.options.settings.begin(), "controller=" + arguments.controller);
   arguments.options.on_plan = [](const auto& replayed, const auto* recorded, const StateLayout& layout) {
     fmt::print("{}", plan_line(replayed, recorded, layout));
     std::fflush(stdout);
@@ -65,20 +66,26 @@ int perform(Arguments arguments, std::stop_token stop) {
 int main(int argc, char** argv) {
   using namespace jostle;
   using namespace jostle::services;
-  CLI::App app("Gives what a recorded run observed to its planner again and compares every plan and every action.\n"
-               "The same build on the same type of machine decides the same, to the last bit, at any rate.",
-               "jostle replay");
+  CLI::App app(
+      "Gives what a recorded run observed to its planner again and compares every plan and every action.\n"
+      "The same build on the same type of machine decides the same, to the last bit, at any rate.",
+      "jostle replay");
   Arguments arguments;
   app.add_option("bag", arguments.bag, "Folder or file that `jostle run --record` or `jostle record` left")->required();
   app.add_option("--goal", arguments.goal, "Only this run of the bag (default: all)");
   app.add_option("--controller", arguments.controller, "What if another had decided: or, nr, mpc");
-  app.add_option("--set", arguments.options.settings,
-                 "What if an option had been another, KEY=VALUE: predictor, seed, plan_only, or a key of the parameters\n"
-                 "such as planner.rollouts; again for more")
-      ->type_name("KEY=VALUE")->take_all();
-  app.add_option("--rate", arguments.options.rate, "Recorded seconds per second between observations; 0: as fast as possible")
-      ->capture_default_str()->check(CLI::Range(0.0, 1000.0));
-  add_count_option(app, "--threads", arguments.threads, 1, "That simulate; auto: one per core this process may use")->default_str("auto");
+  app.add_option(
+         "--set", arguments.options.settings,
+         "What if an option had been another, KEY=VALUE: predictor, seed, plan_only, or a key of the parameters\n"
+         "such as planner.rollouts; again for more")
+      ->type_name("KEY=VALUE")
+      ->take_all();
+  app.add_option("--rate", arguments.options.rate,
+                 "Recorded seconds per second between observations; 0: as fast as possible")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
+  add_count_option(app, "--threads", arguments.threads, 1, "That simulate; auto: one per core this process may use")
+      ->default_str("auto");
   app.add_option("--json", arguments.json, "File for the comparison");
   app.footer("Exit codes: 0 bit-equal, 1 not, 2 bad input, 3 a part of the system failed, 130 interrupted.");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;

@@ -24,8 +24,8 @@ class RecordedWorld {
   class Robot;
   class Objects;
 
-  double time() const;                          ///< of the present observation, s of the world's clock
-  bool asked_for_more() const { return over_; } ///< a command came after the last observation
+  double time() const;                           ///< of the present observation, s of the world's clock
+  bool asked_for_more() const { return over_; }  ///< a command came after the last observation
 
  private:
   Result<Seen> seen() const;

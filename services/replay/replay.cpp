@@ -19,7 +19,8 @@ std::vector<std::string> ReplayReport::reasons() const {
   differs("physics engine", recorded.engine(), here.engine());
   differs("machine", recorded.machine(), here.machine());
   if (reasons.empty()) {
-    reasons.push_back("options, versions and machine type are equal: sources that changed without a new version, or a bug");
+    reasons.push_back(
+        "options, versions and machine type are equal: sources that changed without a new version, or a bug");
   }
   return reasons;
 }
@@ -36,19 +37,21 @@ Result<ReplayReport> replay(const RecordedRun& recorded, const ReplayOptions& op
   constexpr std::chrono::hours kForever{24 * 365};
   task.parameters().control.timeout = task.parameters().mpc.timeout = kForever;
 
-  ReplayReport report{.recorded = recorded.run, .here = describe_run(goal), .changes = std::move(changes_result).value()};
+  ReplayReport report{
+      .recorded = recorded.run, .here = describe_run(goal), .changes = std::move(changes_result).value()};
   RecordedWorld world(recorded, options.rate);
   RecordedWorld::Robot robot(world);
   RecordedWorld::Objects objects(world);
   const StateLayout& layout = task.geometry().layout;
   const Task::Watch watch{
       .journal = {.on_observation = [&](const auto& seen) { report.decisions.observations.push_back(seen); },
-                  .on_plan = [&](const auto& plan) {
-                    const std::size_t place = report.decisions.plans.size();
-                    report.decisions.plans.push_back(plan);
-                    if (!options.on_plan) return;
-                    options.on_plan(plan, place < recorded.plans.size() ? &recorded.plans[place] : nullptr, layout);
-                  }},
+                  .on_plan =
+                      [&](const auto& plan) {
+                        const std::size_t place = report.decisions.plans.size();
+                        report.decisions.plans.push_back(plan);
+                        if (!options.on_plan) return;
+                        options.on_plan(plan, place < recorded.plans.size() ? &recorded.plans[place] : nullptr, layout);
+                      }},
       .time = [&] { return world.time(); }};
   auto outcome_result = task.perform(robot, objects, watch, stop);
   if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};

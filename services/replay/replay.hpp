@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "physics_pool/api/pool.hpp"
+#include "services/recorded/recorded_run.hpp"
 #include "services/replay/changes.hpp"
 #include "services/replay/comparison.hpp"
-#include "services/recorded/recorded_run.hpp"
 
 namespace jostle::services {
 
@@ -19,7 +19,8 @@ struct ReplayOptions {
   double rate = 0.0;  ///< recorded seconds per second between observations; 0: as fast as they are wanted
   /// Hears of every plan, and what it is at that place in the recording (or null).
   std::function<void(const jostle_msgs::msg::Plan& replayed, const jostle_msgs::msg::Plan* recorded,
-                     const StateLayout& layout)> on_plan;
+                     const StateLayout& layout)>
+      on_plan;
 };
 
 struct ReplayReport {

@@ -14,16 +14,18 @@ std::string end_of(const RecordedRun& recorded) {
 
 std::string headline(const RecordedRun& recorded) {
   const auto& goal = recorded.run.goal();
-  return fmt::format("{}: {}, predictor {}, seed {}; {} plans, {} actions; {}\n  recorded by {}; {}; {}\n", goal.goal_id(),
-                     goal.controller(), goal.predictor(), goal.seed(), recorded.plans.size(), recorded.observations.size() - 1,
-                     end_of(recorded), recorded.run.build(), recorded.run.engine(), recorded.run.machine());
+  return fmt::format("{}: {}, predictor {}, seed {}; {} plans, {} actions; {}\n  recorded by {}; {}; {}\n",
+                     goal.goal_id(), goal.controller(), goal.predictor(), goal.seed(), recorded.plans.size(),
+                     recorded.observations.size() - 1, end_of(recorded), recorded.run.build(), recorded.run.engine(),
+                     recorded.run.machine());
 }
 
-std::string plan_line(const jostle_msgs::msg::Plan& replayed, const jostle_msgs::msg::Plan* recorded, const StateLayout& layout) {
+std::string plan_line(const jostle_msgs::msg::Plan& replayed, const jostle_msgs::msg::Plan* recorded,
+                      const StateLayout& layout) {
   const char* judgement = "has no counterpart";
   if (recorded) judgement = compare(layout, *recorded, replayed) ? "DIFFERS" : "equal";
-  return fmt::format("  plan {:>3}  after action {:>2}  {:>3} iterations  {} steps  cost {:>10.4f}  {}\n", replayed.number(),
-                     replayed.observation(), replayed.iterations(),
+  return fmt::format("  plan {:>3}  after action {:>2}  {:>3} iterations  {} steps  cost {:>10.4f}  {}\n",
+                     replayed.number(), replayed.observation(), replayed.iterations(),
                      replayed.nu() > 0 ? replayed.controls().size() / static_cast<std::size_t>(replayed.nu()) : 0,
                      replayed.cost(), judgement);
 }
@@ -46,14 +48,15 @@ std::string verdict(const RecordedRun& recorded, const ReplayReport& report) {
   if (!first.effect.empty()) text += fmt::format("  effect     {}\n", first.effect);
   for (const std::string& reason : report.reasons()) text += fmt::format("  why        {}\n", reason);
   text += fmt::format("  in all     {} equal, each on what was observed in the recorded run\n", counts);
-  text += fmt::format("  end        recorded: {}; replayed: {} ({} plans, {} actions)\n", end_of(recorded), report.ended,
-                      report.decisions.plans.size(), report.decisions.observations.size() - 1);
+  text += fmt::format("  end        recorded: {}; replayed: {} ({} plans, {} actions)\n", end_of(recorded),
+                      report.ended, report.decisions.plans.size(), report.decisions.observations.size() - 1);
   return text;
 }
 
 nlohmann::json to_json(const RecordedRun& recorded, const ReplayReport& report) {
   const auto made_by = [](const jostle_msgs::msg::TaskRun& run) {
-    return nlohmann::json{{"build", run.build()}, {"engine", run.engine()}, {"middleware", run.middleware()}, {"machine", run.machine()}};
+    return nlohmann::json{
+        {"build", run.build()}, {"engine", run.engine()}, {"middleware", run.middleware()}, {"machine", run.machine()}};
   };
   const Comparison& comparison = report.comparison;
   nlohmann::json json{{"goal", recorded.run.goal().goal_id()},
@@ -73,8 +76,8 @@ nlohmann::json to_json(const RecordedRun& recorded, const ReplayReport& report) 
   }
   if (comparison.bit_equal()) return json;
   const Difference& first = *comparison.first;
-  json["first_difference"] = {{"decision", first.decision}, {"field", first.field},   {"recorded", first.recorded},
-                              {"replayed", first.replayed}, {"given", first.given},   {"effect", first.effect},
+  json["first_difference"] = {{"decision", first.decision}, {"field", first.field}, {"recorded", first.recorded},
+                              {"replayed", first.replayed}, {"given", first.given}, {"effect", first.effect},
                               {"why", report.reasons()}};
   return json;
 }

@@ -13,7 +13,8 @@ namespace jostle::services {
 std::string headline(const RecordedRun& recorded);
 
 /// One line about a plan; `recorded` may be null.
-std::string plan_line(const jostle_msgs::msg::Plan& replayed, const jostle_msgs::msg::Plan* recorded, const StateLayout& layout);
+std::string plan_line(const jostle_msgs::msg::Plan& replayed, const jostle_msgs::msg::Plan* recorded,
+                      const StateLayout& layout);
 
 /// The verdict; where the runs part, what differs there, why, and how much they agree.
 std::string verdict(const RecordedRun& recorded, const ReplayReport& report);

@@ -13,8 +13,8 @@ constexpr std::chrono::seconds kRateWindow{1};
 
 void Display::show(const jostle_msgs::msg::Feedback& feedback) {
   measure_rates(feedback);
-  const std::string news = fmt::format("{} {} {} {}", feedback.phase(), feedback.iteration(),
-                                       feedback.actions(), feedback.replans());
+  const std::string news =
+      fmt::format("{} {} {} {}", feedback.phase(), feedback.iteration(), feedback.actions(), feedback.replans());
   const bool is_news = std::exchange(last_news_, news) != news;
   if (line_.live() || is_news) line_.draw(text(feedback));
 }
@@ -28,10 +28,11 @@ std::string Display::text(const jostle_msgs::msg::Feedback& feedback) {
     total += rate;
     workers += fmt::format(" {}:{:.1f}", report.name(), rate);
   }
-  return fmt::format("{:5.1f} s  {:<9} iteration {:>2}  cost {:>8.1f}  target {:>5.1f} cm  actions {:>2}  "
-                     "re-plans {:>2}  {:.1f} rollouts/s [{} ]",
-                     feedback.elapsed(), feedback.phase(), feedback.iteration(), feedback.cost(),
-                     100 * feedback.target_distance(), feedback.actions(), feedback.replans(), total, workers);
+  return fmt::format(
+      "{:5.1f} s  {:<9} iteration {:>2}  cost {:>8.1f}  target {:>5.1f} cm  actions {:>2}  "
+      "re-plans {:>2}  {:.1f} rollouts/s [{} ]",
+      feedback.elapsed(), feedback.phase(), feedback.iteration(), feedback.cost(), 100 * feedback.target_distance(),
+      feedback.actions(), feedback.replans(), total, workers);
 }
 
 void Display::measure_rates(const jostle_msgs::msg::Feedback& feedback) {

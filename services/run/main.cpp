@@ -34,13 +34,15 @@ Result<void> complete(const Arguments& arguments, RunOptions& options) {
   const bool push = options.scene.task.is_push();
   if (options.controller.empty()) options.controller = push ? "mpc" : "or";
   if (push != (options.controller == "mpc")) {
-    return Error{Code::kInvalidArgument, fmt::format("--controller: got {} for a task to {}, wanted {}", options.controller,
-                                                     options.scene.task.kind, push ? "mpc" : "or, nr")};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("--controller: got {} for a task to {}, wanted {}", options.controller,
+                             options.scene.task.kind, push ? "mpc" : "or, nr")};
   }
-  if (auto ok = Predictor::check(options.predictor, options.planning); !ok) return Error{ok.error().code, "--" + ok.error().message};
-  const std::filesystem::path file =
-      arguments.parameters.empty() ? data_file(push ? "experiments/pushing.yaml" : "experiments/grasping.yaml")
-                                   : std::filesystem::path(arguments.parameters);
+  if (auto ok = Predictor::check(options.predictor, options.planning); !ok)
+    return Error{ok.error().code, "--" + ok.error().message};
+  const std::filesystem::path file = arguments.parameters.empty()
+                                         ? data_file(push ? "experiments/pushing.yaml" : "experiments/grasping.yaml")
+                                         : std::filesystem::path(arguments.parameters);
   auto parameters_result = read_text(file);
   if (!parameters_result) return parameters_result.error();
   options.parameters = std::move(parameters_result).value();
@@ -56,9 +58,8 @@ int fail(const Error& error, int code) {
 int perform(const RunOptions& options, std::stop_token stop) {
   LiveLine line("jostle run", options.headless ? PlainLines::kAlways : PlainLines::kElsewhere);
   Display display(line);
-  auto session_result = Session::start(
-      options, {.on_feedback = [&](const auto& feedback) { display.show(feedback); },
-                .on_notice = [&](const std::string& text) { line.say("{}", text); }});
+  auto session_result = Session::start(options, {.on_feedback = [&](const auto& feedback) { display.show(feedback); },
+                                                 .on_notice = [&](const std::string& text) { line.say("{}", text); }});
   if (!session_result) {
     return fail(session_result.error(),
                 session_result.error().code == Code::kInvalidArgument ? kExitUsage : kExitBroken);
@@ -76,45 +77,55 @@ int perform(const RunOptions& options, std::stop_token stop) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Plans and executes a scene: starts workers, a simulated world and a coordinator, shows\n"
-               "their progress, and ends them. More workers may join from anywhere: jostle worker.",
-               "jostle run");
+  CLI::App app(
+      "Plans and executes a scene: starts workers, a simulated world and a coordinator, shows\n"
+      "their progress, and ends them. More workers may join from anywhere: jostle worker.",
+      "jostle run");
   Arguments arguments;
   RunOptions options;
   options.workers = usable_cores();
   bool pin = false;
   app.add_option("scene", arguments.scene, "Scene file; `jostle scene generate` makes one")->required();
-  add_count_option(app, "--workers", options.workers, 0, "Worker processes, or threads; auto: one per core this process may use")
+  add_count_option(app, "--workers", options.workers, 0,
+                   "Worker processes, or threads; auto: one per core this process may use")
       ->default_str("auto");
   app.add_flag("--pin", pin, "Give each worker process a core of its own, in turn");
-  app.add_option("--controller", options.controller, "To grasp, or: online re-planning (default), nr: naive "
-                                                        "re-planning; to push, mpc: model-predictive control (default)")
+  app.add_option("--controller", options.controller,
+                 "To grasp, or: online re-planning (default), nr: naive "
+                 "re-planning; to push, mpc: model-predictive control (default)")
       ->check(CLI::IsMember({"or", "nr", "mpc"}));
-  app.add_option("--predictor", options.predictor,
-                 "What plans of pushes are made with: fine, coarse[,MODEL], parareal:K[,MODEL][,split] or\n"
-                 "parareal:adaptive[,MODEL][,split]; MODEL is kinematic, limit-surface, planar, learned or learned:FILE")
+  app.add_option(
+         "--predictor", options.predictor,
+         "What plans of pushes are made with: fine, coarse[,MODEL], parareal:K[,MODEL][,split] or\n"
+         "parareal:adaptive[,MODEL][,split]; MODEL is kinematic, limit-surface, planar, learned or learned:FILE")
       ->capture_default_str();
   app.add_option("--uncertainty", arguments.level, "none, low, medium or high")->capture_default_str();
   app.add_option("--seed", options.seed, "Of all noise, the planner's and the world's")->capture_default_str();
   app.add_option("--pool", options.pool, "dds: worker processes; threads: threads of the coordinator")
-      ->capture_default_str()->check(CLI::IsMember({"dds", "threads"}));
-  app.add_option("--parameters", arguments.parameters, "Planner's and controller's (default: experiments/grasping.yaml, or pushing.yaml)");
+      ->capture_default_str()
+      ->check(CLI::IsMember({"dds", "threads"}));
+  app.add_option("--parameters", arguments.parameters,
+                 "Planner's and controller's (default: experiments/grasping.yaml, or pushing.yaml)");
   app.add_option("--json", options.json, "File for the result");
   app.add_option("--picture", options.picture, "PNG of the execution");
   app.add_option("--record", options.record, "Folder for a bag of the whole run; `jostle record` has more to say");
   app.add_option("--rate", options.rate, "World seconds per second while acting; 0: as fast as possible")
-      ->capture_default_str()->check(CLI::Range(0.0, 1000.0));
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
   app.add_flag("--plan-only", options.plan_only, "Stop after the first plan");
   app.add_flag("--headless", options.headless, "Plain lines instead of a live display");
   add_network_options(app);
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
-  app.footer("Exit codes: 0 grasped or pushed to its goal, 1 not, 2 bad input, 3 a part of the system failed, 130 interrupted.");
+  app.footer(
+      "Exit codes: 0 grasped or pushed to its goal, 1 not, 2 bad input, 3 a part of the system failed, 130 "
+      "interrupted.");
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (options.pool == "threads" && options.workers == 0) {
     return fail({Code::kInvalidArgument, "--workers: got 0, wanted at least 1 thread"}, kExitUsage);
   }
   if (pin && options.pool == "threads") {
-    return fail({Code::kInvalidArgument, "--pin: got --pool threads, wanted dds: only worker processes are pinned"}, kExitUsage);
+    return fail({Code::kInvalidArgument, "--pin: got --pool threads, wanted dds: only worker processes are pinned"},
+                kExitUsage);
   }
   if (pin) options.cores = allowed_cores();
   const StopSignal signal;

@@ -24,7 +24,8 @@ json frames_of(const json& states, const RunOptions& options, const json& report
     const std::size_t at = shown == 1 ? 0 : i * (count - 1) / (shown - 1);
     std::string caption = fmt::format("{}t = {} s", options.plan_only ? "plan, " : "", at);
     if (at + 1 == count && !options.plan_only) {
-      caption += success ? options.scene.task.is_push() ? "  (at the goal)" : "  (grasped)" : fmt::format("  ({})", report["reason"].get<std::string>());
+      caption += success ? options.scene.task.is_push() ? "  (at the goal)" : "  (grasped)"
+                         : fmt::format("  ({})", report["reason"].get<std::string>());
     }
     frames.push_back({{"caption", caption}, {"q", states[at]}});
   }
@@ -52,11 +53,9 @@ Result<void> draw(const RunOptions& options, const json& report) {
 }
 
 void print_summary(const json& report) {
-  fmt::print("\n{}: {}\n", report["success"].get<bool>() ? "SUCCESS" : "FAILURE",
-             report["reason"].get<std::string>());
-  fmt::print("  first plan   {:.1f} s, {} iterations, cost {:.1f}, hash {}\n",
-             report["plan_seconds"].get<double>(), report["iterations"].get<int>(),
-             report["cost"].get<double>(), report["plan_hash"].get<std::string>());
+  fmt::print("\n{}: {}\n", report["success"].get<bool>() ? "SUCCESS" : "FAILURE", report["reason"].get<std::string>());
+  fmt::print("  first plan   {:.1f} s, {} iterations, cost {:.1f}, hash {}\n", report["plan_seconds"].get<double>(),
+             report["iterations"].get<int>(), report["cost"].get<double>(), report["plan_hash"].get<std::string>());
   fmt::print("  execution    {} actions, {} re-plans, {:.1f} s in all\n", report["actions"].get<int>(),
              report["replans"].get<int>(), report["total_seconds"].get<double>());
   fmt::print("  physics      {} rollouts, {} x {} ({})\n", report["rollouts"].get<std::uint64_t>(),

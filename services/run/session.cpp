@@ -16,13 +16,11 @@ constexpr std::chrono::milliseconds kSilence{1500};  // of a process that speaks
 constexpr std::chrono::seconds kStart{15};           // for processes to start and find each other
 constexpr std::chrono::milliseconds kTick{50};
 constexpr std::chrono::seconds kCancelPatience{2};
-constexpr std::chrono::seconds kLastWords{2};        // for the recorder to hear of the result, and end
-constexpr int kMostRestarts = 5;                     // within kRestartWindow: something is wrong
+constexpr std::chrono::seconds kLastWords{2};  // for the recorder to hear of the result, and end
+constexpr int kMostRestarts = 5;               // within kRestartWindow: something is wrong
 constexpr std::chrono::seconds kRestartWindow{10};
 
-std::filesystem::path program(const char* name) {
-  return program_folder() / (std::string("jostle_") + name);
-}
+std::filesystem::path program(const char* name) { return program_folder() / (std::string("jostle_") + name); }
 
 }  // namespace
 
@@ -30,7 +28,8 @@ Result<std::unique_ptr<Session>> Session::start(const RunOptions& options, Watch
   auto participant_result = dds::Participant::open({.name = "jostle_run", .domain = options.domain});
   if (!participant_result) return participant_result.error();
   // Two that start at once would each hear the other's processes and take them for their own.
-  auto claim_result = DomainClaim::take("run", participant_result->domain(), std::chrono::seconds(1), participant_result->space());
+  auto claim_result =
+      DomainClaim::take("run", participant_result->domain(), std::chrono::seconds(1), participant_result->space());
   if (!claim_result) return claim_result.error();
   auto folder_result = make_temporary_folder("run");
   if (!folder_result) return folder_result.error();
@@ -72,11 +71,11 @@ Session::~Session() {
 // Before everything else, so that it hears everything else.
 Result<void> Session::start_recorder() {
   if (options_.record.empty()) return {};
-  auto process_result = ChildProcess::start(
-      program("record"),
-      {"--output", options_.record.string(), "--until-result", "--domain", std::to_string(participant_.domain()),
-       "--die-with-parent", std::to_string(getpid())},
-      folder_ / "record.log");
+  auto process_result =
+      ChildProcess::start(program("record"),
+                          {"--output", options_.record.string(), "--until-result", "--domain",
+                           std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())},
+                          folder_ / "record.log");
   if (!process_result) return process_result.error();
   recorder_process_ = std::move(process_result).value();
   const auto deadline = Clock::now() + kStart;
@@ -84,7 +83,8 @@ Result<void> Session::start_recorder() {
     const auto ended = recorder_process_->wait_for(kTick);
     if (ended || Clock::now() >= deadline) {
       const Error error{ended ? Code::kInvalidArgument : Code::kUnavailable,
-                        fmt::format("the recorder {}:\n{}", ended ? "did not start" : "is not ready", recorder_process_->last_words())};
+                        fmt::format("the recorder {}:\n{}", ended ? "did not start" : "is not ready",
+                                    recorder_process_->last_words())};
       recorder_process_.reset();
       return error;
     }
@@ -114,21 +114,21 @@ Result<void> Session::start_processes() {
   const auto scene_file = folder_ / "scene.yaml";
   if (auto ok = write_text(scene_file, physics_pool::to_yaml(options_.scene)); !ok) return ok;
 
-  auto world_result = ChildProcess::start(
-      program("sim"),
-      {scene_file.string(), "--uncertainty", physics_pool::to_string(options_.level), "--seed",
-       std::to_string(options_.seed), "--rate", fmt::format("{}", options_.rate), "--domain", domain,
-       "--die-with-parent", std::to_string(getpid())},
-      folder_ / "sim.log");
+  auto world_result =
+      ChildProcess::start(program("sim"),
+                          {scene_file.string(), "--uncertainty", physics_pool::to_string(options_.level), "--seed",
+                           std::to_string(options_.seed), "--rate", fmt::format("{}", options_.rate), "--domain",
+                           domain, "--die-with-parent", std::to_string(getpid())},
+                          folder_ / "sim.log");
   if (!world_result) return world_result.error();
   world_process_ = std::move(world_result).value();
 
-  std::vector<std::string> arguments{"--pool", options_.pool, "--domain", domain, "--die-with-parent", std::to_string(getpid())};
+  std::vector<std::string> arguments{"--pool", options_.pool,       "--domain",
+                                     domain,   "--die-with-parent", std::to_string(getpid())};
   if (options_.pool == "threads") {
     arguments.insert(arguments.end(), {"--threads", std::to_string(options_.workers)});
   }
-  auto coordinator_result =
-      ChildProcess::start(program("coordinator"), arguments, folder_ / "coordinator.log");
+  auto coordinator_result = ChildProcess::start(program("coordinator"), arguments, folder_ / "coordinator.log");
   if (!coordinator_result) return coordinator_result.error();
   coordinator_process_ = std::move(coordinator_result).value();
 
@@ -143,7 +143,8 @@ Result<void> Session::start_processes() {
 
 Result<ChildProcess> Session::start_worker(std::size_t place) {
   const std::string name = fmt::format("worker-{}", workers_started_++);
-  std::vector<std::string> arguments{"--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())};
+  std::vector<std::string> arguments{
+      "--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())};
   if (const auto& cores = options_.cores; !cores.empty()) {
     arguments.insert(arguments.end(), {"--pin", std::to_string(cores[place % cores.size()])});
   }
@@ -189,7 +190,8 @@ void Session::listen() {
 // Who takes goals and gives feedback. Whoever does only one of them looks on.
 std::vector<std::uint64_t> Session::coordinators() const {
   std::vector<std::uint64_t> both;
-  std::ranges::set_intersection(goal_.matched_participants(), feedback_.matched_participants(), std::back_inserter(both));
+  std::ranges::set_intersection(goal_.matched_participants(), feedback_.matched_participants(),
+                                std::back_inserter(both));
   return both;
 }
 
@@ -199,7 +201,8 @@ Result<void> Session::send_goal() {
   if (others_heard_ || found.size() > 1) {
     return Error{Code::kUnavailable,
                  fmt::format("domain {}: got another coordinator beside ours, wanted none; another run uses "
-                             "this domain, set ROS_DOMAIN_ID to a free one, or --namespace to one of its own", participant_.domain())};
+                             "this domain, set ROS_DOMAIN_ID to a free one, or --namespace to one of its own",
+                             participant_.domain())};
   }
   // Another one may be found before ours is there: it says its number when it starts.
   const bool ours = found.size() == 1 && coordinator_process_->has_said(participant_name(found.front()));
@@ -209,8 +212,8 @@ Result<void> Session::send_goal() {
     return Error{Code::kUnavailable,
                  fmt::format("{} not heard within {} s of its start on domain {}; `jostle doctor` checks "
                              "shared memory and multicast",
-                             answers ? "the simulated world was" : "the coordinator was",
-                             kStart.count(), participant_.domain())};
+                             answers ? "the simulated world was" : "the coordinator was", kStart.count(),
+                             participant_.domain())};
   }
   jostle_msgs::msg::Goal goal;
   goal.goal_id(goal_id_);
@@ -266,9 +269,8 @@ Result<void> Session::check_alive(const std::string& name, ChildProcess& child) 
 Result<void> Session::check_heard(const std::string& name, Clock::time_point heard) const {
   const auto silence = Clock::now() - heard;
   if (silence < kSilence) return {};
-  return Error{Code::kUnavailable,
-               fmt::format("{} runs but was not heard for {:.1f} s: stalled or cut off", name,
-                           std::chrono::duration<double>(silence).count())};
+  return Error{Code::kUnavailable, fmt::format("{} runs but was not heard for {:.1f} s: stalled or cut off", name,
+                                               std::chrono::duration<double>(silence).count())};
 }
 
 }  // namespace jostle::services

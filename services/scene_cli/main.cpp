@@ -73,14 +73,12 @@ Result<void> perturb(const Arguments& arguments) {
   if (!level_result) return level_result.error();
   const auto scene_result = physics_pool::load_scene(arguments.input);
   if (!scene_result) return scene_result.error();
-  return write(arguments.output,
-               to_yaml(physics_pool::perturb(*scene_result, *level_result, arguments.seed)));
+  return write(arguments.output, to_yaml(physics_pool::perturb(*scene_result, *level_result, arguments.seed)));
 }
 
 std::string size_text(const SceneObject& object) {
   if (object.shape == physics_pool::Shape::kBox) {
-    return fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * object.size[0], 1e3 * object.size[1],
-                       1e3 * object.size[2]);
+    return fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * object.size[0], 1e3 * object.size[1], 1e3 * object.size[2]);
   }
   return fmt::format("r {:.1f}, h {:.1f}", 1e3 * object.radius, 1e3 * object.height);
 }
@@ -91,19 +89,19 @@ Result<void> show(const Arguments& arguments) {
   const Scene& scene = *scene_result;
   fmt::print("{}  {}\n", scene.name, to_string(scene_hash(scene)));
   fmt::print("{} {} x {} m, {} at x {:.3f}, y {:.3f} m, time step {} s, {} '{}'\n\n",
-             scene.surface.kind == physics_pool::Surface::Kind::kTable ? "table" : "shelf",
-             scene.surface.size[0], scene.surface.size[1], scene.robot.model, scene.robot.x,
-             scene.robot.y, scene.physics.time_step, scene.task.kind, scene.task.target);
+             scene.surface.kind == physics_pool::Surface::Kind::kTable ? "table" : "shelf", scene.surface.size[0],
+             scene.surface.size[1], scene.robot.model, scene.robot.x, scene.robot.y, scene.physics.time_step,
+             scene.task.kind, scene.task.target);
   const auto show_disc = [](const char* name, const physics_pool::Disc& disc) {
-    fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", name, "disc", fmt::format("r {:.1f}", 1e3 * disc.radius), "",
-               "", disc.x, disc.y);
+    fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", name, "disc",
+               fmt::format("r {:.1f}", 1e3 * disc.radius), "", "", disc.x, disc.y);
   };
-  fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8} {:>8} {:>8}\n", "name", "shape", "size mm", "mass kg",
-             "friction", "x m", "y m", "yaw rad");
+  fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8} {:>8} {:>8}\n", "name", "shape", "size mm", "mass kg", "friction",
+             "x m", "y m", "yaw rad");
   for (const SceneObject& object : scene.objects) {
     fmt::print("{:16} {:9} {:20} {:>8.3f} {:>9.3f} {:>8.3f} {:>8.3f} {:>8.3f}\n", object.name,
-               object.shape == physics_pool::Shape::kBox ? "box" : "cylinder", size_text(object),
-               object.mass, object.friction, object.x, object.y, object.yaw);
+               object.shape == physics_pool::Shape::kBox ? "box" : "cylinder", size_text(object), object.mass,
+               object.friction, object.x, object.y, object.yaw);
   }
   if (scene.task.is_push()) show_disc("(goal)", scene.task.goal);
   if (scene.task.obstacle) show_disc("(obstacle)", *scene.task.obstacle);
@@ -117,8 +115,7 @@ void add_input(CLI::App& command, Arguments& arguments) {
 }
 
 void add_output(CLI::App& command, Arguments& arguments) {
-  command.add_option("-o,--output", arguments.output, "file to write; - is the standard output")
-      ->capture_default_str();
+  command.add_option("-o,--output", arguments.output, "file to write; - is the standard output")->capture_default_str();
 }
 
 // Adds the four commands; whichever is given ends up in `chosen`.
@@ -129,18 +126,28 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
     return added;
   };
   CLI::App* generates = command("generate", "make a random scene of the thesis", generate);
-  generates->add_option("--chapter", arguments.chapter, "whose scenes: 3, Sec. 3.3.1, grasping; 6, Sec. 6.3.3, pushing round an obstacle; 7, "
-                                                         "Sec. 7.4, pushing among sliders")
-      ->check(CLI::IsMember({3, 6, 7}))->capture_default_str();
-  generates->add_option("--seed", arguments.generate.seed, "equal seeds give equal scenes")
+  generates
+      ->add_option("--chapter", arguments.chapter,
+                   "whose scenes: 3, Sec. 3.3.1, grasping; 6, Sec. 6.3.3, pushing round an obstacle; 7, "
+                   "Sec. 7.4, pushing among sliders")
+      ->check(CLI::IsMember({3, 6, 7}))
       ->capture_default_str();
-  generates->add_option("--objects", arguments.objects, "objects beside the target: 0 to 40, default 15, of Chapter 3; 0 to 3, default 3, of Chapter 7");
-  generates->add_option("--table", arguments.generate.table, "side of the table of Chapter 3, m; 0: 0.6, larger for more than 15 objects")
+  generates->add_option("--seed", arguments.generate.seed, "equal seeds give equal scenes")->capture_default_str();
+  generates->add_option(
+      "--objects", arguments.objects,
+      "objects beside the target: 0 to 40, default 15, of Chapter 3; 0 to 3, default 3, of Chapter 7");
+  generates
+      ->add_option("--table", arguments.generate.table,
+                   "side of the table of Chapter 3, m; 0: 0.6, larger for more than 15 objects")
       ->capture_default_str();
   generates->add_option("--shape", arguments.shape, "of the sliders of Chapters 6 and 7: cylinder or box")
-      ->check(CLI::IsMember({"cylinder", "box"}))->capture_default_str();
-  generates->add_option("--integrator", arguments.push.integrator, "of Chapters 6 and 7: euler, or rk4, the thesis's, at four times the work")
-      ->check(CLI::IsMember({"euler", "rk4"}))->capture_default_str();
+      ->check(CLI::IsMember({"cylinder", "box"}))
+      ->capture_default_str();
+  generates
+      ->add_option("--integrator", arguments.push.integrator,
+                   "of Chapters 6 and 7: euler, or rk4, the thesis's, at four times the work")
+      ->check(CLI::IsMember({"euler", "rk4"}))
+      ->capture_default_str();
   add_output(*generates, arguments);
 
   add_input(*command("check", "say ok and the scene's hash, or what is wrong", check), arguments);
@@ -148,7 +155,8 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   CLI::App* perturbs = command("perturb", "make a planner's uncertain belief of a scene", perturb);
   add_input(*perturbs, arguments);
   perturbs->add_option("--uncertainty", arguments.uncertainty, "none, low, medium or high")
-      ->check(CLI::IsMember({"none", "low", "medium", "high"}))->capture_default_str();
+      ->check(CLI::IsMember({"none", "low", "medium", "high"}))
+      ->capture_default_str();
   perturbs->add_option("--seed", arguments.seed, "equal seeds give equal beliefs")->capture_default_str();
   add_output(*perturbs, arguments);
 

@@ -120,7 +120,8 @@ std::string governance_text() {
     </domain_rule>
   </domain_access_rules>
 </dds>
-)", kDomains);
+)",
+                     kDomains);
 }
 
 // A rule that allows no topic still lets its holder join a domain.
@@ -139,9 +140,11 @@ std::string permissions_text(const Grant& grant) {
     </grant>
   </permissions>
 </dds>
-)", grant.subject, fmt::format(kDate, fmt::gmtime(grant.validity.not_before)),
+)",
+                     grant.subject, fmt::format(kDate, fmt::gmtime(grant.validity.not_before)),
                      fmt::format(kDate, fmt::gmtime(grant.validity.not_after)), kDomains,
-                     criteria_text("publish", grant.rights.publish), criteria_text("subscribe", grant.rights.subscribe));
+                     criteria_text("publish", grant.rights.publish),
+                     criteria_text("subscribe", grant.rights.subscribe));
 }
 
 Result<std::vector<Grant>> parse_permissions(const std::filesystem::path& file, const std::string& text) {

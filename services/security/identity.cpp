@@ -55,7 +55,8 @@ std::optional<fs::path> keystore_around(const fs::path& folder) {
 Result<void> check_folder(const fs::path& folder) {
   if (!is_there(folder)) {
     return Error{Code::kNotFound, fmt::format("{}: missing, wanted an identity folder; remedy: `jostle keys issue` "
-                                              "makes them in KEYSTORE/identities", folder.string())};
+                                              "makes them in KEYSTORE/identities",
+                                              folder.string())};
   }
   if (const auto keystore = keystore_around(folder)) {
     return wrong(folder, fmt::format("a folder of the keystore {}", keystore->string()), "an identity's",
@@ -100,8 +101,9 @@ Result<void> check_certificate(const fs::path& file, X509& certificate, X509& au
 
 Result<void> check_revocations(const fs::path& file, X509_CRL& list, X509& authority, std::time_t now) {
   if (X509_CRL_verify(&list, X509_get0_pubkey(&authority)) != 1) {
-    return wrong(file, fmt::format("a revocation list by '{}' with a signature that does not fit",
-                                   name_of(X509_CRL_get_issuer(&list))),
+    return wrong(file,
+                 fmt::format("a revocation list by '{}' with a signature that does not fit",
+                             name_of(X509_CRL_get_issuer(&list))),
                  fmt::format("one by '{}' of ca.pem", name_of(X509_get_subject_name(&authority))), kCopyAgain);
   }
   const Period period{.not_before = time_of(X509_CRL_get0_lastUpdate(&list)),
@@ -113,9 +115,10 @@ Result<void> check_revocations(const fs::path& file, X509_CRL& list, X509& autho
 Result<void> check_not_revoked(const fs::path& file, X509_CRL& list, X509& certificate) {
   X509_REVOKED* entry = nullptr;
   if (X509_CRL_get0_by_cert(&list, &entry, &certificate) != 1) return {};
-  return wrong(file, fmt::format("the certificate {} of '{}', revoked on {}", serial_of(certificate),
-                                 name_of(X509_get_subject_name(&certificate)),
-                                 date_text(time_of(X509_REVOKED_get0_revocationDate(entry)))),
+  return wrong(file,
+               fmt::format("the certificate {} of '{}', revoked on {}", serial_of(certificate),
+                           name_of(X509_get_subject_name(&certificate)),
+                           date_text(time_of(X509_REVOKED_get0_revocationDate(entry)))),
                "one that crl.pem does not name", kIssueAgain);
 }
 
@@ -134,8 +137,9 @@ Result<void> check_as_fastdds_does(const fs::path& folder, X509& certificate, X5
     X509_STORE_CTX_set_time(context.get(), 0, now);
     X509_STORE_CTX_set_flags(context.get(), flags | X509_V_FLAG_CHECK_SS_SIGNATURE | X509_V_FLAG_POLICY_CHECK);
     if (X509_verify_cert(context.get()) == 1) return {};
-    return wrong(folder / file, fmt::format("'{}', refused: {}", name_of(X509_get_subject_name(&subject)),
-                                            X509_verify_cert_error_string(X509_STORE_CTX_get_error(context.get()))),
+    return wrong(folder / file,
+                 fmt::format("'{}', refused: {}", name_of(X509_get_subject_name(&subject)),
+                             X509_verify_cert_error_string(X509_STORE_CTX_get_error(context.get()))),
                  "a certificate that verifies", kIssueAgain);
   };
   if (auto ok = verify("ca.pem", authority, X509_V_FLAG_X509_STRICT); !ok) return ok;
@@ -168,7 +172,8 @@ Result<Role> role_of(const fs::path& file, X509& certificate) {
 
 std::vector<std::pair<std::string, std::string>> properties_of(const fs::path& folder) {
   const auto uri = [&](const char* file) { return "file://" + (folder / file).string(); };
-  const std::string authentication = "dds.sec.auth.builtin.PKI-DH.", access = "dds.sec.access.builtin.Access-Permissions.";
+  const std::string authentication = "dds.sec.auth.builtin.PKI-DH.",
+                    access = "dds.sec.access.builtin.Access-Permissions.";
   return {{"dds.sec.auth.plugin", "builtin.PKI-DH"},
           {authentication + "identity_ca", uri("ca.pem")},
           {authentication + "identity_certificate", uri("cert.pem")},

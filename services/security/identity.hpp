@@ -17,10 +17,10 @@ using SystemTime = std::chrono::system_clock::time_point;
 
 struct Identity {
   std::string name;
-  std::string subject;    ///< RFC 2253, such as CN=arm,OU=robot,O=Jostle
+  std::string subject;  ///< RFC 2253, such as CN=arm,OU=robot,O=Jostle
   Role role = Role::kServer;
-  Rights rights;          ///< what its permissions say, whatever the role
-  SystemTime not_after;   ///< of certificate and permissions
+  Rights rights;         ///< what its permissions say, whatever the role
+  SystemTime not_after;  ///< of certificate and permissions
   /// DDS Security properties, name and value, that a participant is made with.
   std::vector<std::pair<std::string, std::string>> properties;
 };
@@ -44,7 +44,6 @@ struct Identity {
 ///          kInvalidArgument  a file is none, or does not fit the others, or its time is over
 ///          kInternal         libcrypto failed
 ///          Messages say the file, what was got, what was wanted, and the remedy.
-Result<Identity> open_identity(const std::filesystem::path& folder,
-                               SystemTime now = std::chrono::system_clock::now());
+Result<Identity> open_identity(const std::filesystem::path& folder, SystemTime now = std::chrono::system_clock::now());
 
 }  // namespace jostle::security

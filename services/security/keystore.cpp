@@ -24,8 +24,8 @@ using security::CryptoError;
 using security::Period;
 using security::Role;
 
-constexpr std::time_t kDay = 86'400;       // seconds
-constexpr std::time_t kHeadStart = kDay;   // more than clocks and time zones differ
+constexpr std::time_t kDay = 86'400;      // seconds
+constexpr std::time_t kHeadStart = kDay;  // more than clocks and time zones differ
 constexpr mode_t kSecret = 0600, kPublic = 0644;
 
 // One certificate, as index.json keeps it.
@@ -107,8 +107,11 @@ class Lock {
 std::string to_json(const std::vector<Record>& records) {
   nlohmann::json list = nlohmann::json::array();
   for (const Record& record : records) {
-    list.push_back({{"name", record.name}, {"role", to_string(record.role)}, {"serial", record.serial},
-                    {"not_after", record.not_after}, {"revoked", record.revoked}});
+    list.push_back({{"name", record.name},
+                    {"role", to_string(record.role)},
+                    {"serial", record.serial},
+                    {"not_after", record.not_after},
+                    {"revoked", record.revoked}});
   }
   return nlohmann::json{{"identities", list}}.dump(2) + "\n";
 }
@@ -123,12 +126,16 @@ Result<std::vector<Record>> read_index(const fs::path& folder) {
     for (const auto& entry : index.at("identities")) {
       const auto role = security::parse_role(entry.at("role").get<std::string>());
       if (!role) throw std::runtime_error("role: got " + entry.at("role").dump());
-      records.push_back({.name = entry.at("name"), .role = *role, .serial = entry.at("serial"),
-                         .not_after = entry.at("not_after"), .revoked = entry.at("revoked")});
+      records.push_back({.name = entry.at("name"),
+                         .role = *role,
+                         .serial = entry.at("serial"),
+                         .not_after = entry.at("not_after"),
+                         .revoked = entry.at("revoked")});
     }
     return records;
   } catch (const std::exception& error) {
-    return Error{Code::kInvalidArgument, fmt::format("{}: got no index of a keystore: {}", file.string(), error.what())};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: got no index of a keystore: {}", file.string(), error.what())};
   }
 }
 
@@ -160,7 +167,8 @@ std::string revocation_pem(const Authority& authority, const std::vector<Record>
 
 bool is_name(const std::string& name) {
   const auto is_plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ||
+           c == '.';
   };
   // X.520 ends common names at 64 characters. A dot in front would hide the folder.
   return !name.empty() && name.size() <= 64 && name.front() != '.' && name.front() != '-' &&
@@ -170,14 +178,15 @@ bool is_name(const std::string& name) {
 Result<void> check_name(const fs::path& folder, const std::vector<Record>& records, const std::string& name) {
   if (!is_name(name)) {
     return Error{Code::kInvalidArgument, fmt::format("name: got '{}', wanted 1 to 64 letters, digits, '-', '_' or '.', "
-                                                     "the first a letter, digit or '_'", name)};
+                                                     "the first a letter, digit or '_'",
+                                                     name)};
   }
   for (const Record& record : records) {
     if (record.name != name || state_of(record, now_seconds()) != State::kValid) continue;
     return Error{Code::kInvalidArgument,
                  fmt::format("name: got '{}', which is valid until {}, wanted a new one; remedy: another name, or "
-                             "first `jostle keys revoke {} {}`", name, security::date_text(record.not_after),
-                             folder.string(), name)};
+                             "first `jostle keys revoke {} {}`",
+                             name, security::date_text(record.not_after), folder.string(), name)};
   }
   return {};
 }
@@ -186,23 +195,23 @@ Result<void> check_validity(std::chrono::days validity, const Authority& authori
   const std::time_t end = security::period_of(*authority.certificate).not_after;
   const auto most = (end - now_seconds()) / kDay;
   if (validity.count() <= most) return {};
-  return Error{Code::kInvalidArgument,
-               fmt::format("days: got {}, wanted at most {}: the keystore itself ends on {}", validity.count(), most,
-                           security::date_text(end))};
+  return Error{Code::kInvalidArgument, fmt::format("days: got {}, wanted at most {}: the keystore itself ends on {}",
+                                                   validity.count(), most, security::date_text(end))};
 }
 
 Result<void> write_identity(const fs::path& draft, const fs::path& folder, const Authority& authority,
                             const Record& record, const std::vector<Record>& records) {
-  const Period period{.not_before = std::min(now_seconds(), record.not_after) - kHeadStart, .not_after = record.not_after};
+  const Period period{.not_before = std::min(now_seconds(), record.not_after) - kHeadStart,
+                      .not_after = record.not_after};
   const security::Key key = security::make_key();
   // The role is part of the subject, for which permissions are signed: those of an
   // earlier certificate of this name cannot serve it in another role.
   const auto certificate = security::make_certificate(
       authority, *key, {.name = record.name, .unit = to_string(record.role)}, record.serial, period);
-  const std::string permissions = security::permissions_text(
-      {.subject = security::name_of(X509_get_subject_name(certificate.get())),
-       .validity = period,
-       .rights = security::rights_of(record.role)});
+  const std::string permissions =
+      security::permissions_text({.subject = security::name_of(X509_get_subject_name(certificate.get())),
+                                  .validity = period,
+                                  .rights = security::rights_of(record.role)});
   const auto governance_result = security::read_file(folder / "ca" / "governance.p7s");
   if (!governance_result) return governance_result.error();
   if (auto ok = make_folder(draft, 0700); !ok) return ok;
@@ -213,7 +222,9 @@ Result<void> write_identity(const fs::path& draft, const fs::path& folder, const
   if (auto ok = write("cert.pem", security::to_pem(*certificate), kPublic); !ok) return ok;
   if (auto ok = write("ca.pem", security::to_pem(*authority.certificate), kPublic); !ok) return ok;
   if (auto ok = write("governance.p7s", *governance_result, kPublic); !ok) return ok;
-  if (auto ok = write("permissions.p7s", security::sign_text(*authority.certificate, *authority.key, permissions), kPublic); !ok) {
+  if (auto ok =
+          write("permissions.p7s", security::sign_text(*authority.certificate, *authority.key, permissions), kPublic);
+      !ok) {
     return ok;
   }
   return write("crl.pem", revocation_pem(authority, records), kPublic);
@@ -232,14 +243,15 @@ Result<T> guarded(const fs::path& folder, Work work) {
 Result<void> create_authority(const fs::path& folder) {
   const std::time_t now = now_seconds();
   // The number tells keystores apart in messages.
-  const Authority authority = security::make_authority(
-      "Jostle CA " + security::make_serial().substr(0, 8),
-      {.not_before = now - kHeadStart, .not_after = now + kLifetime.count() * kDay});
+  const Authority authority =
+      security::make_authority("Jostle CA " + security::make_serial().substr(0, 8),
+                               {.not_before = now - kHeadStart, .not_after = now + kLifetime.count() * kDay});
   const fs::path ca = folder / "ca";
   if (auto ok = make_folder(ca, 0700); !ok) return ok;
   if (auto ok = write_new(ca / "ca.key", security::to_pem(*authority.key), kSecret); !ok) return ok;
   if (auto ok = write_new(ca / "ca.pem", security::to_pem(*authority.certificate), kPublic); !ok) return ok;
-  const std::string governance = security::sign_text(*authority.certificate, *authority.key, security::governance_text());
+  const std::string governance =
+      security::sign_text(*authority.certificate, *authority.key, security::governance_text());
   if (auto ok = write_new(ca / "governance.p7s", governance, kPublic); !ok) return ok;
   if (auto ok = write_new(ca / "crl.pem", revocation_pem(authority, {}), kPublic); !ok) return ok;
   if (auto ok = make_folder(folder / "identities", 0700); !ok) return ok;
@@ -253,7 +265,8 @@ Result<void> create(const fs::path& folder) {
   if (fs::exists(folder, problem) && !(fs::is_directory(folder, problem) && fs::is_empty(folder, problem))) {
     return Error{Code::kInvalidArgument,
                  fmt::format("{}: got something that is there already, wanted a new or empty folder; remedy: another "
-                             "name, or remove it, which makes every identity it issued a stranger's", folder.string())};
+                             "name, or remove it, which makes every identity it issued a stranger's",
+                             folder.string())};
   }
   fs::create_directories(folder, problem);
   if (problem) return Error{Code::kIo, fmt::format("{}: cannot be made: {}", folder.string(), problem.message())};
@@ -273,7 +286,9 @@ Result<fs::path> issue(const fs::path& folder, const std::string& name, Role rol
     if (!authority_result) return authority_result.error();
     if (auto ok = check_validity(validity, *authority_result); !ok) return ok.error();
 
-    records.push_back({.name = name, .role = role, .serial = security::make_serial(),
+    records.push_back({.name = name,
+                       .role = role,
+                       .serial = security::make_serial(),
                        .not_after = now_seconds() + validity.count() * kDay});
     // First of all the index: whatever is issued can be revoked.
     if (auto ok = replace(folder / "ca" / "index.json", to_json(records)); !ok) return ok.error();
@@ -312,8 +327,9 @@ Result<std::vector<fs::path>> revoke(const fs::path& folder, const std::string& 
       for (const Record& record : *records_result) names.push_back(record.name);
       std::ranges::sort(names);
       names.erase(std::unique(names.begin(), names.end()), names.end());
-      return Error{Code::kNotFound, fmt::format("name: got '{}', wanted one that {} issued: {}", name, folder.string(),
-                                                names.empty() ? "none yet" : fmt::format("{}", fmt::join(names, ", ")))};
+      return Error{Code::kNotFound,
+                   fmt::format("name: got '{}', wanted one that {} issued: {}", name, folder.string(),
+                               names.empty() ? "none yet" : fmt::format("{}", fmt::join(names, ", ")))};
     }
     const auto authority_result = load_authority(folder);
     if (!authority_result) return authority_result.error();
@@ -334,9 +350,12 @@ Result<std::vector<fs::path>> revoke(const fs::path& folder, const std::string& 
 
 std::string to_string(State state) {
   switch (state) {
-    case State::kValid: return "valid";
-    case State::kExpired: return "expired";
-    case State::kRevoked: break;
+    case State::kValid:
+      return "valid";
+    case State::kExpired:
+      return "expired";
+    case State::kRevoked:
+      break;
   }
   return "revoked";
 }
@@ -348,7 +367,9 @@ Result<std::vector<Entry>> list(const fs::path& folder, security::SystemTime now
   if (!records_result) return records_result.error();
   std::vector<Entry> entries;
   for (const Record& record : *records_result) {
-    entries.push_back({.name = record.name, .role = record.role, .serial = record.serial,
+    entries.push_back({.name = record.name,
+                       .role = record.role,
+                       .serial = record.serial,
                        .not_after = std::chrono::system_clock::from_time_t(record.not_after),
                        .state = state_of(record, std::chrono::system_clock::to_time_t(now))});
   }

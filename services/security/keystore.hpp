@@ -39,8 +39,8 @@ Result<void> create(const std::filesystem::path& folder);
 /// Makes an identity, valid from yesterday for so many days from now; gives its folder.
 /// Fewer than one day gives one that has expired, for tests. A name may be issued
 /// again once its certificate expired or was revoked; kInvalidArgument before.
-Result<std::filesystem::path> issue(const std::filesystem::path& folder, const std::string& name,
-                                    security::Role role, std::chrono::days validity);
+Result<std::filesystem::path> issue(const std::filesystem::path& folder, const std::string& name, security::Role role,
+                                    std::chrono::days validity);
 
 /// Puts every certificate of that name on the revocation list, and the new list into
 /// every identity of this keystore; gives the files. Copies on other hosts are others'

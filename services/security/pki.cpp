@@ -98,9 +98,7 @@ Certificate unsigned_certificate(EVP_PKEY& holder, const Subject& subject, const
   return certificate;
 }
 
-void sign(X509& certificate, EVP_PKEY& key) {
-  require(X509_sign(&certificate, &key, EVP_sha256()) > 0, "signature");
-}
+void sign(X509& certificate, EVP_PKEY& key) { require(X509_sign(&certificate, &key, EVP_sha256()) > 0, "signature"); }
 
 // What a PEM file may hold, and how libcrypto reads it.
 template <class Handle, class Read>
@@ -110,9 +108,8 @@ Result<Handle> load_pem(const std::filesystem::path& file, const char* wanted, R
   Handle object(read(reading(*text_result).get()));
   if (object) return object;
   const std::string reason = last_error();
-  return Error{Code::kInvalidArgument,
-               fmt::format("{}: got {} bytes that are no {} ({}), wanted a PEM file", file.string(),
-                           text_result->size(), wanted, reason)};
+  return Error{Code::kInvalidArgument, fmt::format("{}: got {} bytes that are no {} ({}), wanted a PEM file",
+                                                   file.string(), text_result->size(), wanted, reason)};
 }
 
 // Libcrypto would ask at the terminal.
@@ -232,26 +229,23 @@ Result<std::string> read_file(const std::filesystem::path& file) {
   if (reason == ENOENT || reason == ENOTDIR) {
     return Error{Code::kNotFound, fmt::format("{}: missing", file.string())};
   }
-  return Error{Code::kIo, fmt::format("{}: cannot be read: {}", file.string(),
-                                      reason ? std::strerror(reason) : "no file")};
+  return Error{Code::kIo,
+               fmt::format("{}: cannot be read: {}", file.string(), reason ? std::strerror(reason) : "no file")};
 }
 
 Result<Certificate> load_certificate(const std::filesystem::path& file) {
-  return load_pem<Certificate>(file, "certificate", [](BIO* in) {
-    return PEM_read_bio_X509(in, nullptr, no_password, nullptr);
-  });
+  return load_pem<Certificate>(file, "certificate",
+                               [](BIO* in) { return PEM_read_bio_X509(in, nullptr, no_password, nullptr); });
 }
 
 Result<Key> load_key(const std::filesystem::path& file) {
-  return load_pem<Key>(file, "private key without a password", [](BIO* in) {
-    return PEM_read_bio_PrivateKey(in, nullptr, no_password, nullptr);
-  });
+  return load_pem<Key>(file, "private key without a password",
+                       [](BIO* in) { return PEM_read_bio_PrivateKey(in, nullptr, no_password, nullptr); });
 }
 
 Result<RevocationList> load_revocation_list(const std::filesystem::path& file) {
-  return load_pem<RevocationList>(file, "revocation list", [](BIO* in) {
-    return PEM_read_bio_X509_CRL(in, nullptr, no_password, nullptr);
-  });
+  return load_pem<RevocationList>(file, "revocation list",
+                                  [](BIO* in) { return PEM_read_bio_X509_CRL(in, nullptr, no_password, nullptr); });
 }
 
 Result<std::string> load_signed_text(const std::filesystem::path& file, X509& authority) {
@@ -304,7 +298,8 @@ std::string part_of(const X509_NAME* name, int nid) {
 }
 
 std::string serial_of(const X509& certificate) {
-  const Number number = required(Number(ASN1_INTEGER_to_BN(X509_get0_serialNumber(&certificate), nullptr)), "serial number");
+  const Number number =
+      required(Number(ASN1_INTEGER_to_BN(X509_get0_serialNumber(&certificate), nullptr)), "serial number");
   const std::unique_ptr<char, void (*)(char*)> text(BN_bn2hex(number.get()), [](char* it) { OPENSSL_free(it); });
   return required(text.get(), "serial number");
 }
@@ -315,7 +310,8 @@ std::time_t time_of(const ASN1_TIME* time) {
 }
 
 Period period_of(const X509& certificate) {
-  return {.not_before = time_of(X509_get0_notBefore(&certificate)), .not_after = time_of(X509_get0_notAfter(&certificate))};
+  return {.not_before = time_of(X509_get0_notBefore(&certificate)),
+          .not_after = time_of(X509_get0_notAfter(&certificate))};
 }
 
 std::string date_text(std::time_t time) { return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(time)); }

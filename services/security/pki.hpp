@@ -48,8 +48,8 @@ struct Authority {
 
 /// What a certificate says of its holder: CN, OU and O of its subject.
 struct Subject {
-  std::string name;          ///< CN
-  std::string unit;          ///< OU; empty: none
+  std::string name;  ///< CN
+  std::string unit;  ///< OU; empty: none
 };
 
 struct Revocation {

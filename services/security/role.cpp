@@ -6,23 +6,31 @@ namespace jostle::security {
 
 Rights rights_of(Role role) {
   switch (role) {
-    case Role::kRobot: return {.publish = {"*"}, .subscribe = {"*"}};
+    case Role::kRobot:
+      return {.publish = {"*"}, .subscribe = {"*"}};
     // Said topics in full: no pattern of a worker may ever match a robot's topic,
     // whatever namespaces there will be.
-    case Role::kWorker: return {.publish = {"rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"},
-                                .subscribe = {"rt/pool/*", "rt/doctor/*"}};
-    case Role::kObserver: return {.publish = {}, .subscribe = {"*"}};
-    case Role::kServer: break;
+    case Role::kWorker:
+      return {.publish = {"rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"},
+              .subscribe = {"rt/pool/*", "rt/doctor/*"}};
+    case Role::kObserver:
+      return {.publish = {}, .subscribe = {"*"}};
+    case Role::kServer:
+      break;
   }
   return {};
 }
 
 std::string to_string(Role role) {
   switch (role) {
-    case Role::kRobot: return "robot";
-    case Role::kWorker: return "worker";
-    case Role::kObserver: return "observer";
-    case Role::kServer: break;
+    case Role::kRobot:
+      return "robot";
+    case Role::kWorker:
+      return "worker";
+    case Role::kObserver:
+      return "observer";
+    case Role::kServer:
+      break;
   }
   return "server";
 }

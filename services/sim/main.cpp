@@ -23,7 +23,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--seed", options.seed, "Of the noise")->capture_default_str();
   app.add_option("--rate", options.rate, "World seconds per second; 0: as fast as possible")
-      ->capture_default_str()->check(CLI::Range(0.0, 1000.0));
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
   app.add_flag("--free-running", options.free_running, "Go on between actions instead of standing still");
   add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
@@ -46,7 +47,8 @@ int main(int argc, char** argv) {
   auto participant_result = dds::Participant::open(participant_options);
   if (!participant_result) return fail(participant_result.error(), kExitUsage);
   // Before it says a word.
-  const auto claim_result = DomainClaim::take("simulated world", participant_result->domain(), std::chrono::seconds(1), participant_result->space());
+  const auto claim_result = DomainClaim::take("simulated world", participant_result->domain(), std::chrono::seconds(1),
+                                              participant_result->space());
   if (!claim_result) return fail(claim_result.error(), kExitBroken);
 
   try {

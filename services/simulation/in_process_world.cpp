@@ -29,8 +29,7 @@ Result<robot_bridge::RobotReading> SimulatedRobot::read() {
   return robot_bridge::RobotReading{
       .q = {x.q.begin(), x.q.begin() + joints},
       .v = {x.v.begin(), x.v.begin() + joints},
-      .object_in_hand = geometry.task.is_push() ? std::nullopt
-                                                : std::optional(physics_pool::at_goal(geometry, x, {}))};
+      .object_in_hand = geometry.task.is_push() ? std::nullopt : std::optional(physics_pool::at_goal(geometry, x, {}))};
 }
 
 Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {
@@ -45,8 +44,7 @@ Result<void> SimulatedRobot::execute(std::span<const double> u, double duration,
 }
 
 Result<std::vector<perception::ObjectReading>> SimulatedObjects::read() {
-  const State seen =
-      physics_pool::observed_state(world_.world().scene(), belief_, world_.state(), next_);
+  const State seen = physics_pool::observed_state(world_.world().scene(), belief_, world_.state(), next_);
   next_ = physics_pool::Measurement::kFeedback;
   return object_readings(world_.world().geometry().layout, seen);
 }

@@ -30,7 +30,8 @@ struct LinkQuality {
 /// is a function of seed, direction and n alone.
 class Losses {
  public:
-  Losses(const LinkQuality& quality, std::uint64_t direction) : loss_(quality.loss), random_(quality.seed + direction) {}
+  Losses(const LinkQuality& quality, std::uint64_t direction)
+      : loss_(quality.loss), random_(quality.seed + direction) {}
 
   bool next() { return static_cast<double>(random_() >> 11) * 0x1.0p-53 < loss_; }
 

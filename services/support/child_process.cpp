@@ -31,8 +31,7 @@ std::string describe(int status) {
 }  // namespace
 
 Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
-                                         const std::vector<std::string>& arguments,
-                                         const std::filesystem::path& log) {
+                                         const std::vector<std::string>& arguments, const std::filesystem::path& log) {
   std::vector<std::string> words{program.string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
@@ -57,8 +56,7 @@ Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
   posix_spawn_file_actions_destroy(&files);
   posix_spawnattr_destroy(&attributes);
   if (problem != 0) {
-    return Error{Code::kNotFound,
-                 fmt::format("{}: cannot be started: {}", program.string(), std::strerror(problem))};
+    return Error{Code::kNotFound, fmt::format("{}: cannot be started: {}", program.string(), std::strerror(problem))};
   }
   return ChildProcess(pid, log);
 }

@@ -21,8 +21,7 @@ namespace jostle::services {
 class ChildProcess {
  public:
   /// Error kNotFound if the program cannot be started; names it.
-  static Result<ChildProcess> start(const std::filesystem::path& program,
-                                    const std::vector<std::string>& arguments,
+  static Result<ChildProcess> start(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                                     const std::filesystem::path& log);
 
   ChildProcess(ChildProcess&& other) noexcept;

@@ -27,9 +27,7 @@ std::string ranges_of(const std::vector<int>& cores) {
   return text;
 }
 
-std::optional<int> parse_core(const std::string& text) {
-  return parse_whole(text, 0, CPU_SETSIZE - 1);
-}
+std::optional<int> parse_core(const std::string& text) { return parse_whole(text, 0, CPU_SETSIZE - 1); }
 
 // Version 2's line of /proc/self/cgroup: "0::/the/group".
 std::string own_group() {
@@ -111,7 +109,10 @@ CLI::Option* add_count_option(CLI::App& app, const std::string& name, int& count
         return std::string();
       },
       "");
-  return app.add_option(name, count, help)->transform(automatic)->check(CLI::Range(least, 1024).description(""))->type_name("N|auto");
+  return app.add_option(name, count, help)
+      ->transform(automatic)
+      ->check(CLI::Range(least, 1024).description(""))
+      ->type_name("N|auto");
 }
 
 }  // namespace jostle::services

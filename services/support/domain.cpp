@@ -36,7 +36,8 @@ Result<int> choose_domain(std::optional<int> wanted) {
   const std::string text = wanted ? std::to_string(*wanted) : environment ? environment : "";
   if (text.empty()) return 0;
   if (const auto domain = parse_whole(text, 0, kLargestDomain)) return *domain;
-  return Error{Code::kInvalidArgument, fmt::format("{}: got '{}', wanted 0 to {}", wanted ? "--domain" : "ROS_DOMAIN_ID", text, kLargestDomain)};
+  return Error{Code::kInvalidArgument, fmt::format("{}: got '{}', wanted 0 to {}",
+                                                   wanted ? "--domain" : "ROS_DOMAIN_ID", text, kLargestDomain)};
 }
 
 int multicast_port(int domain) { return 7400 + kPortsPerDomain * domain; }
@@ -49,8 +50,10 @@ std::optional<PortTrouble> port_trouble(int domain) {
   const int begin = multicast_port(domain), end = std::min(begin + kPortsPerDomain - 1, 65535);
   if (end < first || begin > last || all_reserved(begin, end)) return {};
   return PortTrouble{
-      fmt::format("its UDP ports, {} to {}, are among those that Linux gives to any program ({} to {}), which then gets what was "
-                  "meant for one of ours", begin, end, first, last),
+      fmt::format("its UDP ports, {} to {}, are among those that Linux gives to any program ({} to {}), which then "
+                  "gets what was "
+                  "meant for one of ours",
+                  begin, end, first, last),
       fmt::format("a ROS_DOMAIN_ID below {}, or sysctl -w net.ipv4.ip_local_reserved_ports={}-{} on each host",
                   (first - multicast_port(0)) / kPortsPerDomain, begin, end)};
 }

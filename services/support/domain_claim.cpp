@@ -37,9 +37,10 @@ Result<DomainClaim> DomainClaim::take(const std::string& role, int domain, std::
   while (bind(handle, reinterpret_cast<const sockaddr*>(&address), length) != 0) {
     if (errno != EADDRINUSE) return failed("bind");
     if (std::chrono::steady_clock::now() >= deadline) {
-      return Error{Code::kUnavailable, fmt::format("domain {}: got another {} on this machine{}, wanted none; set ROS_DOMAIN_ID "
-                                                   "to a free one, or --namespace to one of its own", domain, role,
-                                                   space.empty() ? "" : " in namespace " + space)};
+      return Error{Code::kUnavailable,
+                   fmt::format("domain {}: got another {} on this machine{}, wanted none; set ROS_DOMAIN_ID "
+                               "to a free one, or --namespace to one of its own",
+                               domain, role, space.empty() ? "" : " in namespace " + space)};
     }
     std::this_thread::sleep_for(kRetry);
   }
@@ -63,8 +64,10 @@ Result<OwnDomain> claim_some_domain() {
     auto claim_result = DomainClaim::take("experiment", candidate, std::chrono::milliseconds(0));
     if (claim_result) return OwnDomain{candidate, std::move(claim_result).value()};
   }
-  return Error{Code::kUnavailable, fmt::format("DDS domains 1 to {}: all in use by tests and benchmarks of this machine; "
-                                               "wanted one, give it with --domain", kOwnDomains)};
+  return Error{Code::kUnavailable,
+               fmt::format("DDS domains 1 to {}: all in use by tests and benchmarks of this machine; "
+                           "wanted one, give it with --domain",
+                           kOwnDomains)};
 }
 
 }  // namespace jostle::services

@@ -16,8 +16,8 @@ namespace jostle::services {
 /// exactly as far as loopback traffic does, the network namespace.
 class DomainClaim {
  public:
-  /// `role`: a few words; `space`: the namespace it is in, "" for none. Waits up to `patience` for a predecessor that is just ending.
-  /// Error kUnavailable if another process has the role.
+  /// `role`: a few words; `space`: the namespace it is in, "" for none. Waits up to `patience` for a predecessor that
+  /// is just ending. Error kUnavailable if another process has the role.
   static Result<DomainClaim> take(const std::string& role, int domain, std::chrono::milliseconds patience,
                                   const std::string& space = "");
 

@@ -50,8 +50,8 @@ Result<void> write_text(const fs::path& file, const std::string& text) {
   if (out) fs::rename(draft, file, problem);
   if (out && !problem) return {};
   fs::remove(draft, ignored);
-  return Error{Code::kIo, fmt::format("{}: cannot be written{}", file.string(),
-                                      problem ? ": " + problem.message() : "")};
+  return Error{Code::kIo,
+               fmt::format("{}: cannot be written{}", file.string(), problem ? ": " + problem.message() : "")};
 }
 
 Result<fs::path> make_temporary_folder(const std::string& purpose) {

@@ -135,7 +135,8 @@ Result<std::unique_ptr<Hosts>> Hosts::make(int count, const LinkQuality& quality
   } catch (const std::exception& problem) {
     return Error{Code::kUnavailable,
                  fmt::format("hosts as network namespaces: {}; wanted the right to make them: run it as root, or "
-                             "under `unshare --user --map-root-user`", problem.what())};
+                             "under `unshare --user --map-root-user`",
+                             problem.what())};
   }
   return hosts;
 }

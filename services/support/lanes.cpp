@@ -35,7 +35,8 @@ Result<std::string> terminal_of(const fs::path& picture) {
 
 Result<void> check(const LaneChart& chart) {
   if (chart.lanes.empty()) return wrong("no lanes", "at least one");
-  if (!(chart.length > 0 && std::isfinite(chart.length))) return wrong(fmt::format("a length of {}", chart.length), "more than 0");
+  if (!(chart.length > 0 && std::isfinite(chart.length)))
+    return wrong(fmt::format("a length of {}", chart.length), "more than 0");
   for (const LaneChart::Bar& bar : chart.bars) {
     const bool ok = bar.lane >= 0 && bar.lane < std::ssize(chart.lanes) && bar.series >= 0 &&
                     bar.series < std::ssize(chart.series) && std::isfinite(bar.from) && std::isfinite(bar.to);
@@ -51,7 +52,8 @@ std::string data_of(const LaneChart& chart, int series, bool hatched) {
   std::string text;
   for (const LaneChart::Bar& bar : chart.bars) {
     if (bar.series != series || bar.hatched != hatched) continue;
-    text += fmt::format("{:.9g} {} {:.9g} {:.9g} {} {}\n", bar.from, bar.lane, bar.from, bar.to, bar.lane - kBar, bar.lane + kBar);
+    text += fmt::format("{:.9g} {} {:.9g} {:.9g} {} {}\n", bar.from, bar.lane, bar.from, bar.to, bar.lane - kBar,
+                        bar.lane + kBar);
   }
   return text;
 }
@@ -122,14 +124,15 @@ std::string script_of(const fs::path& picture, const std::string& terminal, cons
   layers.add(ground_of(chart), kIdle, "");
   for (int series = 0; series < std::ssize(chart.series); ++series) {
     const char* colour = colour_of(series);
-    layers.add(data_of(chart, series, false), fmt::format("fc rgb '{}' fs solid border lc rgb '#ffffff' lw 0.6", colour),
+    layers.add(data_of(chart, series, false),
+               fmt::format("fc rgb '{}' fs solid border lc rgb '#ffffff' lw 0.6", colour),
                chart.series[static_cast<std::size_t>(series)]);
     layers.add(data_of(chart, series, true), fmt::format("fc rgb '{0}' fs pattern 4 border lc rgb '{0}'", colour), "");
   }
   if (!chart.hatched.empty()) layers.add("", "fc rgb '#444444' fs pattern 4 border lc rgb '#444444'", chart.hatched);
   layers.add("", kIdle, "idle");
-  return frame_of(picture, terminal, chart) + layers.data + "plot " +
-         layers.plots.substr(0, layers.plots.size() - 2) + "\nunset output\n";
+  return frame_of(picture, terminal, chart) + layers.data + "plot " + layers.plots.substr(0, layers.plots.size() - 2) +
+         "\nunset output\n";
 }
 
 }  // namespace

@@ -23,9 +23,9 @@ class LiveLine {
   LiveLine(const LiveLine&) = delete;
   LiveLine& operator=(const LiveLine&) = delete;
 
-  bool live() const { return live_; }             ///< drawn over
+  bool live() const { return live_; }  ///< drawn over
   bool visible() const { return live_ || plain_; }
-  std::size_t width() const;                      ///< characters that fit into it
+  std::size_t width() const;  ///< characters that fit into it
   /// ASCII; what does not fit is cut off, unless the line is a plain one.
   void draw(std::string_view text);
   void finish();  ///< leaves the line standing; what comes next has one of its own

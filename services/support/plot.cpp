@@ -22,13 +22,15 @@ constexpr double kBottom = 0.13, kTop = 0.90, kTitle = 0.955;
 Result<void> check(const std::vector<Panel>& panels) {
   if (panels.empty()) return Error{Code::kInvalidArgument, "plot: got no panel, wanted at least one"};
   for (const Panel& panel : panels) {
-    if (panel.bands.empty()) return Error{Code::kInvalidArgument, "plot: got a panel without bands, wanted at least one"};
+    if (panel.bands.empty())
+      return Error{Code::kInvalidArgument, "plot: got a panel without bands, wanted at least one"};
     for (const Band& band : panel.bands) {
       const std::size_t n = band.x.size();
       if (n > 0 && band.low.size() == n && band.middle.size() == n && band.high.size() == n) continue;
-      return Error{Code::kInvalidArgument,
-                   fmt::format("plot: {}: got {} x, {} low, {} middle and {} high values, wanted equally many, at least one",
-                               band.name, n, band.low.size(), band.middle.size(), band.high.size())};
+      return Error{
+          Code::kInvalidArgument,
+          fmt::format("plot: {}: got {} x, {} low, {} middle and {} high values, wanted equally many, at least one",
+                      band.name, n, band.low.size(), band.middle.size(), band.high.size())};
     }
   }
   return {};
@@ -94,8 +96,8 @@ std::string script_of(const fs::path& png, const std::string& title, const std::
       "set key at screen {},{} left top vertical Left reverse samplen 2 spacing 1.4 textcolor rgb '#222222'\n"
       "set label 1 {} at screen {},{} left font ',{}'\n"
       "set multiplot\n",
-      width, kHeight, kFont, quoted(png.string()), kBottom, kTop, across(frames), kTop, quoted(title),
-      across(kAxis), kTitle, kFont + 2);
+      width, kHeight, kFont, quoted(png.string()), kBottom, kTop, across(frames), kTop, quoted(title), across(kAxis),
+      kTitle, kFont + 2);
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const int left = kPanelWidth * static_cast<int>(p);
     text += fmt::format("set lmargin at screen {}\nset rmargin at screen {}\n", across(left + kAxis),

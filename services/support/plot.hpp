@@ -28,7 +28,6 @@ struct Panel {
 /// Errors   kInvalidArgument  nothing to draw, or a band's sizes disagree
 ///          kNotFound         gnuplot is not installed
 ///          kIo               the file cannot be written; gnuplot's own words
-Result<void> plot(const std::filesystem::path& png, const std::string& title,
-                  const std::vector<Panel>& panels);
+Result<void> plot(const std::filesystem::path& png, const std::string& title, const std::vector<Panel>& panels);
 
 }  // namespace jostle::services

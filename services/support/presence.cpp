@@ -23,7 +23,8 @@ constexpr milliseconds kGlance{200};
 milliseconds now() {
   timespec time{};
   clock_gettime(CLOCK_BOOTTIME, &time);
-  return std::chrono::duration_cast<milliseconds>(std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec));
+  return std::chrono::duration_cast<milliseconds>(std::chrono::seconds(time.tv_sec) +
+                                                  std::chrono::nanoseconds(time.tv_nsec));
 }
 
 }  // namespace

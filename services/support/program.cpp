@@ -1,13 +1,13 @@
 #include "services/support/program.hpp"
 
 #include <fmt/format.h>
-#include <csignal>
-#include <cstdlib>
 #include <pthread.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sys/prctl.h>
 #include <unistd.h>
+#include <csignal>
+#include <cstdlib>
 
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -40,7 +40,8 @@ sigset_t stop_signals() {
 void warn_of_ports(std::optional<int> wanted) {
   const auto domain_result = choose_domain(wanted);
   const auto trouble = domain_result ? port_trouble(*domain_result) : std::nullopt;
-  if (trouble) fmt::print(stderr, "warning: DDS domain {}: {}; better: {}\n", *domain_result, trouble->finding, trouble->remedy);
+  if (trouble)
+    fmt::print(stderr, "warning: DDS domain {}: {}; better: {}\n", *domain_result, trouble->finding, trouble->remedy);
 }
 
 }  // namespace
@@ -58,7 +59,8 @@ StopSignal::StopSignal() {
     // first: timeout(1) sends its signal twice.
     std::this_thread::sleep_for(kTogether);
     const timespec at_once{};
-    while (sigtimedwait(&set, nullptr, &at_once) > 0) {}
+    while (sigtimedwait(&set, nullptr, &at_once) > 0) {
+    }
     pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
     for (;;) pause();
   }).detach();
@@ -89,11 +91,13 @@ void add_network_options(CLI::App& app) {
   app.add_option_function<std::string>("--discovery", sets("JOSTLE_DISCOVERY"),
                                        "How processes find each other: multicast, peers:HOST,HOST,... or\n"
                                        "server:HOST[:PORT] (default: JOSTLE_DISCOVERY, else multicast)");
-  app.add_option_function<std::string>("--namespace", sets("JOSTLE_NAMESPACE"),
-                                       "Of the robot's topics, such as left: several robots then share a domain and its\n"
-                                       "workers (default: JOSTLE_NAMESPACE, else none)");
-  app.add_option_function<std::string>("--secure", sets("JOSTLE_SECURE"),
-                                       "Identity folder made by `jostle keys` (default: JOSTLE_SECURE, else unprotected)");
+  app.add_option_function<std::string>(
+      "--namespace", sets("JOSTLE_NAMESPACE"),
+      "Of the robot's topics, such as left: several robots then share a domain and its\n"
+      "workers (default: JOSTLE_NAMESPACE, else none)");
+  app.add_option_function<std::string>(
+      "--secure", sets("JOSTLE_SECURE"),
+      "Identity folder made by `jostle keys` (default: JOSTLE_SECURE, else unprotected)");
 }
 
 void add_process_options(CLI::App& app, ProcessOptions& options) {

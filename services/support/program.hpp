@@ -20,10 +20,10 @@ namespace jostle::services {
 /// Exit codes of all programs.
 enum ExitCode : int {
   kExitOk = 0,
-  kExitFailed = 1,       ///< the work was done and failed
-  kExitUsage = 2,        ///< wrong arguments or a bad file
-  kExitBroken = 3,       ///< parts of the system failed
-  kExitInterrupted = 130 ///< Ctrl-C
+  kExitFailed = 1,        ///< the work was done and failed
+  kExitUsage = 2,         ///< wrong arguments or a bad file
+  kExitBroken = 3,        ///< parts of the system failed
+  kExitInterrupted = 130  ///< Ctrl-C
 };
 
 /// Turns SIGINT and SIGTERM into a stop request for the whole process. Another one, half a

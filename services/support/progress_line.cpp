@@ -31,13 +31,15 @@ void ProgressLine::show(std::uint64_t done, std::uint64_t total, std::uint64_t f
   line_.draw(fmt::format("{}: {}", options_.doing, progress_text(options_.unit, done, total, seconds, found)));
 }
 
-std::string progress_text(std::string_view unit, std::uint64_t done, std::uint64_t total, double seconds, std::uint64_t found) {
+std::string progress_text(std::string_view unit, std::uint64_t done, std::uint64_t total, double seconds,
+                          std::uint64_t found) {
   // A damaged bag may hold more than it says.
   const std::uint64_t percent = done < total ? done * 100 / total : 100;
   const double per_second = rate(done - found, seconds);
   std::string text = fmt::format("{} of {} {} ({} %)", done, total, unit, percent);
   if (per_second > 0) text += fmt::format(", {:.1f} per second", per_second);
-  if (per_second > 0 && done < total) text += fmt::format(", {} left", duration_text(static_cast<double>(total - done) / per_second));
+  if (per_second > 0 && done < total)
+    text += fmt::format(", {} left", duration_text(static_cast<double>(total - done) / per_second));
   return text;
 }
 

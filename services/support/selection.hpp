@@ -9,7 +9,7 @@ namespace jostle::services {
 
 /// Globs as a shell's (fnmatch(3)), of ROS names; `*` goes past slashes: "/robot/*", "*pose*".
 struct Selection {
-  std::vector<std::string> topics;    ///< empty: all
+  std::vector<std::string> topics;  ///< empty: all
   std::vector<std::string> excluded;
 
   bool wants(const std::string& topic) const;

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 #include <sys/utsname.h>
 
-#include <chrono>
 #include <fastrtps/config.h>
+#include <chrono>
 #include <fstream>
 
 #include "physics_pool/local/simulator.hpp"
@@ -19,8 +19,8 @@ Result<ControlOptions::Method> parse_controller(const std::string& name, const p
   if (task.is_push() && name == "mpc") return ControlOptions::Method::kOnline;  // asked of nobody
   if (!task.is_push() && name == "or") return ControlOptions::Method::kOnline;
   if (!task.is_push() && name == "nr") return ControlOptions::Method::kNaive;
-  return Error{Code::kInvalidArgument, fmt::format("controller: got '{}' for a task to {}, wanted {}", name,
-                                                   task.kind, task.is_push() ? "mpc" : "or, nr")};
+  return Error{Code::kInvalidArgument, fmt::format("controller: got '{}' for a task to {}, wanted {}", name, task.kind,
+                                                   task.is_push() ? "mpc" : "or, nr")};
 }
 
 // "x86_64, AMD EPYC 7B13": what floating-point results may depend on.

@@ -37,8 +37,8 @@ class Task {
   };
 
   /// Errors   those of the controllers
-  Result<planners::Outcome> perform(robot_bridge::Robot& robot, perception::ObjectSource& objects,
-                                    const Watch& watch, std::stop_token stop);
+  Result<planners::Outcome> perform(robot_bridge::Robot& robot, perception::ObjectSource& objects, const Watch& watch,
+                                    std::stop_token stop);
 
   const physics_pool::Scene& execution_scene() const { return execution_; }
   /// Of the planning scene.
@@ -54,8 +54,8 @@ class Task {
   physics_pool::Scene execution_;
   physics_pool::WorldPtr believed_;  // the planning scene
   Parameters parameters_;
-  Predictor predictor_;              // what stands between the pool and the planner
-  Hash world_;                       // planning world, known to the predictor
+  Predictor predictor_;  // what stands between the pool and the planner
+  Hash world_;           // planning world, known to the predictor
 };
 
 /// A goal that is taken up now, by this build on this machine.

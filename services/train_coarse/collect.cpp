@@ -18,8 +18,8 @@ constexpr std::chrono::minutes kPatience{10};  // with one episode: a pool may b
 constexpr std::uint32_t kMaxAttempts = 100;
 
 // A draw that the fine model cannot finish is made again.
-Result<std::vector<Transition>> run_episode(physics_pool::Pool& pool, const DataOrigin& origin,
-                                            std::uint32_t episode, std::stop_token stop) {
+Result<std::vector<Transition>> run_episode(physics_pool::Pool& pool, const DataOrigin& origin, std::uint32_t episode,
+                                            std::stop_token stop) {
   std::string reason;
   for (std::uint32_t attempt = 0; attempt < kMaxAttempts; ++attempt) {
     const auto batch = draw_episode(origin, episode, attempt);
@@ -39,9 +39,13 @@ class Collector {
  public:
   Collector(physics_pool::Pool& pool, TransitionWriter writer, const CollectOptions& options,
             const std::function<void(const CollectProgress&)>& report)
-      : pool_(pool), options_(options), report_(report), writer_(std::move(writer)),
+      : pool_(pool),
+        options_(options),
+        report_(report),
+        writer_(std::move(writer)),
         progress_{writer_.size(), writer_.size(), options.samples},
-        next_(static_cast<std::uint32_t>(writer_.size() / kEpisodeSteps)), next_written_(next_),
+        next_(static_cast<std::uint32_t>(writer_.size() / kEpisodeSteps)),
+        next_written_(next_),
         end_(static_cast<std::uint32_t>((options.samples + kEpisodeSteps - 1) / kEpisodeSteps)) {}
 
   Result<CollectProgress> run(std::stop_token stop) {

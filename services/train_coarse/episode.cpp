@@ -75,8 +75,8 @@ Point draw_pusher(const DataOrigin& origin, const std::vector<Point>& sliders, C
 double draw_aim(const DataOrigin& origin, const Point& pusher, const std::vector<Point>& sliders,
                 CounterStream& random) {
   // The next one is what a push is mostly about.
-  const Point& nearest = *std::ranges::min_element(
-      sliders, {}, [&](const Point& slider) { return distance(slider, pusher); });
+  const Point& nearest =
+      *std::ranges::min_element(sliders, {}, [&](const Point& slider) { return distance(slider, pusher); });
   const Point& slider = random.uniform(0.0, 1.0) < 0.85 ? nearest : pick(sliders, random);
   const double touching = origin.pusher_radius + origin.slider_radius;
   const double offset = random.uniform(-touching, touching);

@@ -17,8 +17,8 @@ namespace {
 
 using namespace physics_pool;
 
-constexpr double kMoved = 0.001;               // m
-constexpr double kPenetrationTolerance = 5e-4; // m; F has as much
+constexpr double kMoved = 0.001;                // m
+constexpr double kPenetrationTolerance = 5e-4;  // m; F has as much
 
 std::vector<double> planar(const std::array<float, kPlanarSize>& state, int sliders) {
   return {state.begin(), state.begin() + PlanarLayout{sliders}.size()};
@@ -146,17 +146,17 @@ std::vector<Accuracy> accuracy_of(const Network& network, const TransitionFile& 
 
 std::string accuracy_table(const std::vector<Accuracy>& rows) {
   constexpr double kDegrees = 180 / std::numbers::pi;
-  std::string text = fmt::format("{:>7} {:>8} {:>7} | {:>6} {:>6} {:>6} | {:>6} {:>6} | {:>6} {:>6} | {:>6} {:>6} {:>7}\n",
-                                 "sliders", "pushed", "way mm", "mean", "median", "90 %", "median", "90 %", "mean", "rms",
-                                 "pen. %", "mean", "deepest");
+  std::string text = fmt::format(
+      "{:>7} {:>8} {:>7} | {:>6} {:>6} {:>6} | {:>6} {:>6} | {:>6} {:>6} | {:>6} {:>6} {:>7}\n", "sliders", "pushed",
+      "way mm", "mean", "median", "90 %", "median", "90 %", "mean", "rms", "pen. %", "mean", "deepest");
   text += fmt::format("{:>7} {:>8} {:>7} | {:^20} | {:^13} | {:^13} | {:^21}\n", "", "", "", "error of pushed, mm",
                       "angle, deg", "of all, mm", "penetration, mm");
   for (const Accuracy& row : rows) {
-    text += fmt::format("{:>7} {:>8} {:>7.1f} | {:>6.2f} {:>6.2f} {:>6.2f} | ", row.sliders, row.pushed, 1e3 * row.mean_way,
-                        1e3 * row.mean, 1e3 * row.median, 1e3 * row.p90);
-    text += fmt::format("{:>6.2f} {:>6.2f} | {:>6.2f} {:>6.2f} | {:>6.1f} {:>6.2f} {:>7.2f}\n", kDegrees * row.angle_median,
-                        kDegrees * row.angle_p90, 1e3 * row.all_mean, 1e3 * row.all_rms, 1e2 * row.penetrating,
-                        1e3 * row.mean_depth, 1e3 * row.deepest);
+    text += fmt::format("{:>7} {:>8} {:>7.1f} | {:>6.2f} {:>6.2f} {:>6.2f} | ", row.sliders, row.pushed,
+                        1e3 * row.mean_way, 1e3 * row.mean, 1e3 * row.median, 1e3 * row.p90);
+    text += fmt::format("{:>6.2f} {:>6.2f} | {:>6.2f} {:>6.2f} | {:>6.1f} {:>6.2f} {:>7.2f}\n",
+                        kDegrees * row.angle_median, kDegrees * row.angle_p90, 1e3 * row.all_mean, 1e3 * row.all_rms,
+                        1e2 * row.penetrating, 1e3 * row.mean_depth, 1e3 * row.deepest);
   }
   return text;
 }

@@ -33,15 +33,15 @@ Examples examples_of(const TransitionFile& data, Part part, double held_out, con
 
 /// Errors of one-step predictions over the sliders that F moves by 1 mm or more.
 struct Accuracy {
-  int sliders = 0;                   ///< in the scene
-  std::size_t pushed = 0;            ///< sliders that F moved
-  double mean_way = 0.0;             ///< how far, m
-  double mean = 0.0, median = 0.0, p90 = 0.0;           ///< position error, m
-  double angle_median = 0.0, angle_p90 = 0.0;           ///< rad
-  double all_mean = 0.0;             ///< position error of all sliders of all transitions, m
-  double all_rms = 0.0;              ///< its root mean square, m
-  double penetrating = 0.0;          ///< share of predictions with penetration beyond 0.5 mm
-  double deepest = 0.0, mean_depth = 0.0;  ///< of those, m
+  int sliders = 0;                             ///< in the scene
+  std::size_t pushed = 0;                      ///< sliders that F moved
+  double mean_way = 0.0;                       ///< how far, m
+  double mean = 0.0, median = 0.0, p90 = 0.0;  ///< position error, m
+  double angle_median = 0.0, angle_p90 = 0.0;  ///< rad
+  double all_mean = 0.0;                       ///< position error of all sliders of all transitions, m
+  double all_rms = 0.0;                        ///< its root mean square, m
+  double penetrating = 0.0;                    ///< share of predictions with penetration beyond 0.5 mm
+  double deepest = 0.0, mean_depth = 0.0;      ///< of those, m
 };
 
 /// Per number of sliders; those without a transition are left out.

@@ -22,12 +22,12 @@ using physics_pool::Network;
 using physics_pool::NetworkLayer;
 
 constexpr std::array kWidths{kInputs, 512, 256, 128, 64, kOutputs};  // Sec. 7.2.1.1
-constexpr float kPositionUnit = 0.01f;       // m; what an error of one unit is
-constexpr float kAngleUnit = 0.4f;           // rad; cylinders look the same from all sides
-constexpr float kVelocityUnit = 2.0f;        // shares of the pusher's speed; forgotten within millimetres
-constexpr float kTolerance = 5e-4f;          // m, of penetration
-constexpr std::size_t kFewest = 200;         // transitions that touch something
-constexpr long kChunk = 8192;                // held-out examples judged at a time
+constexpr float kPositionUnit = 0.01f;                               // m; what an error of one unit is
+constexpr float kAngleUnit = 0.4f;                                   // rad; cylinders look the same from all sides
+constexpr float kVelocityUnit = 2.0f;  // shares of the pusher's speed; forgotten within millimetres
+constexpr float kTolerance = 5e-4f;    // m, of penetration
+constexpr std::size_t kFewest = 200;   // transitions that touch something
+constexpr long kChunk = 8192;          // held-out examples judged at a time
 
 struct Mlp : torch::nn::Module {
   Mlp() {
@@ -93,7 +93,8 @@ Network network_of(const Mlp& mlp, const Network& frame) {
   Network network = frame;
   network.layers.clear();
   for (const torch::nn::Linear& linear : mlp.layers) {
-    NetworkLayer layer{.inputs = static_cast<int>(linear->weight.size(1)), .outputs = static_cast<int>(linear->weight.size(0))};
+    NetworkLayer layer{.inputs = static_cast<int>(linear->weight.size(1)),
+                       .outputs = static_cast<int>(linear->weight.size(0))};
     layer.weights = values_of(linear->weight);
     layer.biases = values_of(linear->bias);
     network.layers.push_back(std::move(layer));
@@ -123,7 +124,8 @@ Network frame_of(const TransitionFile& data, const Examples& examples) {
 }
 
 Tensors tensors_of(const Examples& examples, const Network& frame) {
-  return {(tensor_of(examples.inputs, kInputs) - tensor_of(frame.input_mean, kInputs)) / tensor_of(frame.input_scale, kInputs),
+  return {(tensor_of(examples.inputs, kInputs) - tensor_of(frame.input_mean, kInputs)) /
+              tensor_of(frame.input_scale, kInputs),
           tensor_of(examples.targets, kOutputs) / tensor_of(frame.output_scale, kOutputs),
           tensor_of(examples.places, Examples::kPlaces)};
 }
@@ -145,9 +147,11 @@ Result<Network> fit_with_torch(const TransitionFile& data, const FitOptions& opt
   const Examples learn = examples_of(data, Part::kLearn, options.held_out, physics_pool::kParking);
   const Examples check = examples_of(data, Part::kHeldOut, options.held_out, physics_pool::kParking);
   if (learn.size() < kFewest || check.size() == 0) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("got {} transitions that touch a slider to learn from and {} to check, wanted {} and 1; collect more",
-                             learn.size(), check.size(), kFewest)};
+    return Error{
+        Code::kInvalidArgument,
+        fmt::format(
+            "got {} transitions that touch a slider to learn from and {} to check, wanted {} and 1; collect more",
+            learn.size(), check.size(), kFewest)};
   }
   torch::set_num_threads(options.threads);
   torch::manual_seed(options.seed);
@@ -182,7 +186,8 @@ Result<Network> fit_with_torch(const TransitionFile& data, const FitOptions& opt
       adam.step();
       sum += value.item<double>();
     }
-    const FitProgress progress{epoch, sum / static_cast<double>(batches), held_out_loss(mlp, held_out, geometry, weight)};
+    const FitProgress progress{epoch, sum / static_cast<double>(batches),
+                               held_out_loss(mlp, held_out, geometry, weight)};
     if (progress.held_out_loss < best_loss) {
       best_loss = progress.held_out_loss;
       best = network_of(mlp, frame);

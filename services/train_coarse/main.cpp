@@ -32,12 +32,16 @@ struct Arguments {
 int fail(const Error& error) {
   fmt::print(stderr, "jostle train-coarse: {}\n", error.message);
   switch (error.code) {
-    case Code::kCancelled: return kExitInterrupted;
+    case Code::kCancelled:
+      return kExitInterrupted;
     case Code::kInvalidArgument:
-    case Code::kNotFound: return kExitUsage;
+    case Code::kNotFound:
+      return kExitUsage;
     case Code::kUnavailable:
-    case Code::kInternal: return kExitBroken;
-    default: return kExitFailed;
+    case Code::kInternal:
+      return kExitBroken;
+    default:
+      return kExitFailed;
   }
 }
 
@@ -77,7 +81,8 @@ int fit_network(Arguments& arguments, std::stop_token stop) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const double left = seconds / progress.epoch * (arguments.fit.epochs - progress.epoch);
     fmt::print(stderr, "epoch {:>3} of {}: loss {:.5f}, held out {:.5f}, {:.1f} s each, {} left\n", progress.epoch,
-               arguments.fit.epochs, progress.loss, progress.held_out_loss, seconds / progress.epoch, duration_text(left));
+               arguments.fit.epochs, progress.loss, progress.held_out_loss, seconds / progress.epoch,
+               duration_text(left));
   });
   if (!network_result) return fail(network_result.error());
   if (auto ok = write_text(arguments.net, to_file(*network_result)); !ok) return fail(ok.error());
@@ -118,36 +123,48 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   CLI::App* data = command("data", "push cylinders about and note what happens", collect_data);
   data->add_option("--out", arguments.data, "File of transitions; one that exists is continued")->required();
   data->add_option("--samples", arguments.collect.samples, "Transitions the file is to have")
-      ->capture_default_str()->check(CLI::Range(1u, 4'000'000'000u));
+      ->capture_default_str()
+      ->check(CLI::Range(1u, 4'000'000'000u));
   data->add_option("--seed", arguments.collect.origin.seed, "Equal seeds give equal files")
-      ->capture_default_str()->check(CLI::Range(0u, 4'000'000'000u));
+      ->capture_default_str()
+      ->check(CLI::Range(0u, 4'000'000'000u));
   data->add_option("--pool", arguments.pool, "threads: in this process; dds: worker processes")
-      ->capture_default_str()->check(CLI::IsMember({"dds", "threads"}));
+      ->capture_default_str()
+      ->check(CLI::IsMember({"dds", "threads"}));
   data->add_option("--threads", arguments.threads, "Of the pool of threads")
-      ->capture_default_str()->check(CLI::Range(1, 1024));
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1024));
   add_process_options(*data, arguments.process);
 
   const auto add_held_out = [&arguments](CLI::App& to) {
     to.add_option("--held-out", arguments.fit.held_out, "Share of the episodes for validation only")
-        ->capture_default_str()->check(CLI::Range(0.001, 0.5));
+        ->capture_default_str()
+        ->check(CLI::Range(0.001, 0.5));
   };
   CLI::App* fits = command("fit", "fit the network to transitions and say how well it predicts", fit_network);
   fits->add_option("--data", arguments.data, "File of transitions")->required();
   fits->add_option("--out", arguments.net, "File of the network")->required();
   fits->add_option("--epochs", arguments.fit.epochs, "Passes over the data; Ctrl-C keeps the best so far")
-      ->capture_default_str()->check(CLI::Range(1, 100'000));
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100'000));
   fits->add_option("--batch-size", arguments.fit.batch_size, "Transitions per step")
-      ->capture_default_str()->check(CLI::Range(1, 1'000'000));
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1'000'000));
   fits->add_option("--learning-rate", arguments.fit.learning_rate, "Of Adam, at first")
-      ->capture_default_str()->check(CLI::Range(1e-8, 1.0));
+      ->capture_default_str()
+      ->check(CLI::Range(1e-8, 1.0));
   fits->add_option("--no-penetration-weight", arguments.fit.no_penetration_weight, "W_F of Eq. 7.5")
-      ->capture_default_str()->check(CLI::Range(0.0, 1e6));
-  fits->add_option("--seed", arguments.fit.seed, "Of the first weights and the order of the data")->capture_default_str();
-  fits->add_option("--threads", arguments.fit.threads, "Of libtorch")->capture_default_str()->check(CLI::Range(1, 1024));
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e6));
+  fits->add_option("--seed", arguments.fit.seed, "Of the first weights and the order of the data")
+      ->capture_default_str();
+  fits->add_option("--threads", arguments.fit.threads, "Of libtorch")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1024));
   add_held_out(*fits);
 
-  CLI::App* checks = command("check", "say how well a network predicts, and compare its forward pass with libtorch's",
-                             check_network);
+  CLI::App* checks =
+      command("check", "say how well a network predicts, and compare its forward pass with libtorch's", check_network);
   checks->add_option("--net", arguments.net, "File of the network")->required();
   checks->add_option("--data", arguments.data, "File of transitions")->required();
   checks->add_flag("--all", arguments.everything, "Errors of all transitions, not of those that fit holds out");

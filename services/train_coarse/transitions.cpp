@@ -32,7 +32,8 @@ Error wrong(const fs::path& file, const std::string& why) {
 Result<DataOrigin> read_header(std::istream& in, const fs::path& file) {
   std::array<char, kHeaderSize> header;
   if (!in.read(header.data(), header.size())) {
-    return wrong(file, fmt::format("header: got {} bytes, wanted {}; delete it and collect anew", in.gcount(), kHeaderSize));
+    return wrong(file,
+                 fmt::format("header: got {} bytes, wanted {}; delete it and collect anew", in.gcount(), kHeaderSize));
   }
   if (std::string_view(header.data(), kMagic.size()) != kMagic) {
     return wrong(file, "magic: wanted 'jostle-pushes 1', a file that jostle train-coarse data has written");

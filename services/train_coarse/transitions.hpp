@@ -18,13 +18,13 @@ inline constexpr int kPlanarSize = 2 * (2 + 3 * kMaxSliders);
 /// What the transitions of a file have in common; equal in all parts of it.
 struct DataOrigin {
   std::uint64_t seed = 1;
-  double pusher_radius = 0.0145, pusher_height = 0.11;  ///< m
+  double pusher_radius = 0.0145, pusher_height = 0.11;     ///< m
   double slider_radius = 0.05115, slider_height = 0.0245;  ///< m
-  double slider_mass = 0.5;      ///< kg
+  double slider_mass = 0.5;                                ///< kg
   double slider_friction = 0.2;
-  double duration = 1.0;         ///< Delta_t, s
-  double time_step = 0.001;      ///< of the fine model, s
-  double max_speed = 0.1;        ///< along each axis, m/s
+  double duration = 1.0;     ///< Delta_t, s
+  double time_step = 0.001;  ///< of the fine model, s
+  double max_speed = 0.1;    ///< along each axis, m/s
 
   bool operator==(const DataOrigin&) const = default;
 };

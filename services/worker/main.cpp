@@ -36,7 +36,8 @@ int serve(const dds::ParticipantOptions& dds_options, const WorkerOptions& optio
     }
     WorkerService worker(*participant_result, options);
     const std::string where = options.cores.empty() ? "" : fmt::format(", on cores {}", fmt::join(options.cores, ", "));
-    spdlog::info("{}: {} rollouts at a time{}, domain {}", worker.name(), options.threads, where, participant_result->domain());
+    spdlog::info("{}: {} rollouts at a time{}, domain {}", worker.name(), options.threads, where,
+                 participant_result->domain());
     const std::string reason = wait_until_forgotten(known, kPause, stop);
     if (!reason.empty()) spdlog::info("{}: joins again: {}", worker.name(), reason);
   }
@@ -66,11 +67,14 @@ int main(int argc, char** argv) {
   dds::ParticipantOptions dds_options{.name = "jostle_worker"};
   ProcessOptions process;
   std::string pin;
-  auto* threads = add_count_option(app, "--threads", options.threads, 1, "Rollouts at a time; auto: one per core this process may use")
+  auto* threads = add_count_option(app, "--threads", options.threads, 1,
+                                   "Rollouts at a time; auto: one per core this process may use")
                       ->default_str("1, or as many as --pin lists");
-  auto* pinned = app.add_option("--pin", pin, "Keep each simulating thread on a core of its own: one of this list, such as\n"
-                                              "2,3,6-8; without a list, one of those this process may use")
-                     ->expected(0, 1)->type_name("[CORES]");
+  auto* pinned = app.add_option("--pin", pin,
+                                "Keep each simulating thread on a core of its own: one of this list, such as\n"
+                                "2,3,6-8; without a list, one of those this process may use")
+                     ->expected(0, 1)
+                     ->type_name("[CORES]");
   app.add_option("--name", options.name, "As clients report it (default: host and process id)");
   add_process_options(app, process);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;

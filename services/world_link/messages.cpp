@@ -58,8 +58,7 @@ Result<void> check(const perception::ObjectReading& object, std::size_t index) {
   for (const double value : object.orientation) norm += value * value;
   if (std::abs(norm - 1.0) > 1e-3) {
     return Error{Code::kInvalidArgument,
-                 fmt::format("{}.pose.orientation: got norm {}, wanted a unit quaternion", field,
-                             std::sqrt(norm))};
+                 fmt::format("{}.pose.orientation: got norm {}, wanted a unit quaternion", field, std::sqrt(norm))};
   }
   return {};
 }
@@ -117,20 +116,16 @@ std_msgs::msg::Header make_header(double time, const std::string& frame) {
   return header;
 }
 
-double seconds(const std_msgs::msg::Header& header) {
-  return header.stamp().sec() + 1e-9 * header.stamp().nanosec();
-}
+double seconds(const std_msgs::msg::Header& header) { return header.stamp().sec() + 1e-9 * header.stamp().nanosec(); }
 
-jostle_msgs::msg::ObjectStates to_message(const std::vector<perception::ObjectReading>& objects,
-                                          double time) {
+jostle_msgs::msg::ObjectStates to_message(const std::vector<perception::ObjectReading>& objects, double time) {
   jostle_msgs::msg::ObjectStates message;
   message.header(make_header(time));
   message.objects(to_messages(objects));
   return message;
 }
 
-Result<std::vector<perception::ObjectReading>> from_message(
-    const jostle_msgs::msg::ObjectStates& message) {
+Result<std::vector<perception::ObjectReading>> from_message(const jostle_msgs::msg::ObjectStates& message) {
   return from_messages(message.objects());
 }
 
@@ -167,8 +162,7 @@ tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates&
 
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message) {
   if (auto ok = check_finite(message.q(), message.v()); !ok) return ok.error();
-  return robot_bridge::RobotReading{
-      .q = message.q(), .v = message.v(), .object_in_hand = message.object_in_hand()};
+  return robot_bridge::RobotReading{.q = message.q(), .v = message.v(), .object_in_hand = message.object_in_hand()};
 }
 
 jostle_msgs::msg::Observation to_message(const Seen& seen, double time) {

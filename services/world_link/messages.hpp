@@ -21,8 +21,7 @@ inline constexpr const char* kWorldFrame = "world";
 std_msgs::msg::Header make_header(double time, const std::string& frame = kWorldFrame);
 double seconds(const std_msgs::msg::Header& header);
 
-jostle_msgs::msg::ObjectStates to_message(const std::vector<perception::ObjectReading>& objects,
-                                          double time);
+jostle_msgs::msg::ObjectStates to_message(const std::vector<perception::ObjectReading>& objects, double time);
 /// Error kInvalidArgument naming the field that is not finite or no rotation.
 Result<std::vector<perception::ObjectReading>> from_message(const jostle_msgs::msg::ObjectStates& message);
 

@@ -55,14 +55,12 @@ void SimulatedWorld::receive() {
 }
 
 void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
-  if (command.epoch() < epoch_ ||
-      (command.epoch() == epoch_ && command.sequence_number() <= accepted_)) {
-    spdlog::warn("command {}/{} is stale ({} so far), dropped", command.epoch(),
-                 command.sequence_number(), ++dropped_);
+  if (command.epoch() < epoch_ || (command.epoch() == epoch_ && command.sequence_number() <= accepted_)) {
+    spdlog::warn("command {}/{} is stale ({} so far), dropped", command.epoch(), command.sequence_number(), ++dropped_);
     return;
   }
-  const auto check_result = robot_bridge::check_command(command.velocities(), world_.world().geometry().layout.nu,
-                                                        command.duration());
+  const auto check_result =
+      robot_bridge::check_command(command.velocities(), world_.world().geometry().layout.nu, command.duration());
   if (!check_result && command.epoch() > epoch_) {  // the present commander must not suffer for it
     spdlog::warn("command {}/{} of a newcomer: {}; refused", command.epoch(), command.sequence_number(),
                  check_result.error().message);
@@ -130,9 +128,9 @@ void SimulatedWorld::publish() {
   const physics_pool::TaskGeometry& geometry = world_.world().geometry();
   const State& truth = world_.state();
   const double time = world_.time();
-  const State seen = physics_pool::observed_state(
-      world_.world().scene(), belief_, truth,
-      moved_ ? physics_pool::Measurement::kFeedback : physics_pool::Measurement::kInitial);
+  const State seen =
+      physics_pool::observed_state(world_.world().scene(), belief_, truth,
+                                   moved_ ? physics_pool::Measurement::kFeedback : physics_pool::Measurement::kInitial);
   const auto objects = to_message(object_readings(geometry.layout, seen), time);
   objects_.write(objects);
   poses_.write(pose_array_message(objects));

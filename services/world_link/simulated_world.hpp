@@ -59,13 +59,13 @@ class SimulatedWorld {
   SimulatedWorldOptions options_;
   physics_pool::ExecutionWorld world_;
   physics_pool::Scene belief_;
-  std::vector<double> still_;          // the control that moves nothing
+  std::vector<double> still_;  // the control that moves nothing
   std::deque<Action> actions_;
-  std::uint64_t epoch_ = 0;            // of the commander
-  std::uint64_t finished_ = 0;         // its last finished command
-  std::uint64_t accepted_ = 0;         // its last accepted command
-  std::uint64_t dropped_ = 0;          // stale commands
-  bool moved_ = false;                 // a command was begun
+  std::uint64_t epoch_ = 0;     // of the commander
+  std::uint64_t finished_ = 0;  // its last finished command
+  std::uint64_t accepted_ = 0;  // its last accepted command
+  std::uint64_t dropped_ = 0;   // stale commands
+  bool moved_ = false;          // a command was begun
   bool busy_ = false;
   std::string error_;
   std::chrono::steady_clock::time_point next_publication_;

@@ -21,10 +21,11 @@ std::uint64_t epoch_now() {
 
 Error silent(const char* who, const std::string& topic, std::chrono::milliseconds time, bool heard) {
   return {Code::kUnavailable,
-          heard ? fmt::format("{}: nothing heard on {} for {:.1f} s; the process ended or is stalled", who,
-                              topic, time.count() / 1e3)
+          heard ? fmt::format("{}: nothing heard on {} for {:.1f} s; the process ended or is stalled", who, topic,
+                              time.count() / 1e3)
                 : fmt::format("{}: nobody publishes {} ({:.1f} s waited); start one with `jostle sim SCENE` "
-                              "on the same ROS_DOMAIN_ID", who, topic, time.count() / 1e3)};
+                              "on the same ROS_DOMAIN_ID",
+                              who, topic, time.count() / 1e3)};
 }
 
 }  // namespace
@@ -52,9 +53,8 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::stop_token s
       continue;
     }
     if (sequence_number_ > 0 && status->epoch() > epoch_) {
-      return Error{Code::kUnavailable,
-                   fmt::format("robot: another commander took over: its epoch is {}, ours {}",
-                               status->epoch(), epoch_)};
+      return Error{Code::kUnavailable, fmt::format("robot: another commander took over: its epoch is {}, ours {}",
+                                                   status->epoch(), epoch_)};
     }
     if (known_ && status->epoch() < epoch_) {
       return Error{Code::kUnavailable, "robot: the world was started anew and knows nothing of this task"};
@@ -71,8 +71,8 @@ Result<robot_bridge::RobotReading> RobotClient::read() {
   for (;;) {
     auto status_result = next_status({});
     if (!status_result) return status_result.error();
-    const bool current = sequence_number_ == 0 || (status_result->epoch() == epoch_ &&
-                                                   status_result->sequence_number() == sequence_number_);
+    const bool current = sequence_number_ == 0 ||
+                         (status_result->epoch() == epoch_ && status_result->sequence_number() == sequence_number_);
     if (!current || status_result->busy()) continue;
     return from_message(*status_result);
   }

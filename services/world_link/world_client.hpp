@@ -58,8 +58,7 @@ class RobotClient final : public robot_bridge::Robot {
 /// reported and skipped; only if nothing good follows are they an error.
 class ObjectsClient final : public perception::ObjectSource {
  public:
-  ObjectsClient(const dds::Participant& participant, const RobotClient& robot,
-                const WorldClientOptions& options = {});
+  ObjectsClient(const dds::Participant& participant, const RobotClient& robot, const WorldClientOptions& options = {});
 
   Result<std::vector<perception::ObjectReading>> read() override;
 

@@ -24,14 +24,13 @@ bool starts_with_any(std::string_view text, std::initializer_list<std::string_vi
 // Middleware headers and what fastddsgen makes of idl/msg.
 bool is_dds(std::string_view include) {
   return starts_with_any(include, {"fastdds/", "fastrtps/", "fastcdr/", "idl/msg/"}) ||
-         include.find("_msgs/") != std::string_view::npos ||
-         include.find("PubSubTypes") != std::string_view::npos;
+         include.find("_msgs/") != std::string_view::npos || include.find("PubSubTypes") != std::string_view::npos;
 }
 
 bool is_engine(std::string_view include) { return starts_with_any(include, {"mujoco"}); }
 
-constexpr std::string_view kRooms[] = {"idl/", "physics_pool/", "planners/", "robot_bridge/",
-                                       "perception/", "services/", "tests/"};
+constexpr std::string_view kRooms[] = {"idl/",        "physics_pool/", "planners/", "robot_bridge/",
+                                       "perception/", "services/",     "tests/"};
 
 bool is_ours(std::string_view include) {
   return std::ranges::any_of(kRooms, [&](std::string_view room) { return include.starts_with(room); });
@@ -48,8 +47,7 @@ std::string objection(std::string_view file, std::string_view include) {
       (is_dds(include) || (include.starts_with("services/dds/") && include != "services/dds/qos.hpp"))) {
     return "bags are files: of DDS they know what a topic promises, which is a plain value";
   }
-  if (is_engine(include) && !in_tests &&
-      !starts_with_any(file, {"physics_pool/local/", "physics_pool/render/"})) {
+  if (is_engine(include) && !in_tests && !starts_with_any(file, {"physics_pool/local/", "physics_pool/render/"})) {
     return "only physics_pool/local and physics_pool/render speak MuJoCo";
   }
   if (include.starts_with("tests/") && !in_tests) return "nothing may include tests";
@@ -80,9 +78,8 @@ std::string objection(std::string_view file, std::string_view include) {
     return allow({"idl/types/", "perception/"}, "perception knows values and itself");
   }
   if (file.starts_with("planners/")) {
-    return allow({"idl/types/", "planners/", "physics_pool/api/", "physics_pool/scene/",
-                  "physics_pool/objective/", "physics_pool/sampling/", "robot_bridge/api/",
-                  "perception/api/"},
+    return allow({"idl/types/", "planners/", "physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
+                  "physics_pool/sampling/", "robot_bridge/api/", "perception/api/"},
                  "planners know a Pool and the two ports, never what is behind them");
   }
   return "";
@@ -128,8 +125,8 @@ TEST(Architecture, EveryIncludeFollowsTheArrows) {
     std::ifstream source(fs::path(JOSTLE_SOURCE_DIR) / file);
     for (const Include& include : includes_of(source)) {
       const std::string why = objection(file.generic_string(), include.path);
-      EXPECT_TRUE(why.empty()) << file.generic_string() << ":" << include.line << ": includes "
-                               << include.path << ", but " << why;
+      EXPECT_TRUE(why.empty()) << file.generic_string() << ":" << include.line << ": includes " << include.path
+                               << ", but " << why;
     }
   }
 }

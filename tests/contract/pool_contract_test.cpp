@@ -1,7 +1,7 @@
 // What every Pool promises, asked of every implementation.
 
-#include <gmock/gmock.h>
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 
 #include <cmath>
 #include <future>
@@ -25,8 +25,8 @@ constexpr auto kPatience = 60s;  // for what should take well under a second
 
 struct Implementation {
   const char* name;
-  int threads;  // in this process, or
-  int workers;  // processes over DDS
+  int threads;            // in this process, or
+  int workers;            // processes over DDS
   bool parareal = false;  // on top of them, with as many iterations as steps
 };
 

@@ -51,7 +51,10 @@ TEST_F(BadInput, SceneThatIsNoneIsRefusedWithFileFieldGotAndWanted) {
 TEST_F(BadInput, SceneThatCannotBeIsRefusedWithFileFieldGotAndWanted) {
   const std::string spoilt = folder.path() / "spoilt.yaml";
   using physics_pool::Scene;
-  expect_refused({scene_file([](Scene& s) { s.objects[1].x = s.objects[0].x; s.objects[1].y = s.objects[0].y; })},
+  expect_refused({scene_file([](Scene& s) {
+                   s.objects[1].x = s.objects[0].x;
+                   s.objects[1].y = s.objects[0].y;
+                 })},
                  {spoilt, "objects[1]", "target", "can"});
   expect_refused({scene_file([](Scene& s) { s.robot.model = "shoggoth"; })},
                  {spoilt, "robot.model", "got 'shoggoth'", "wanted"});
@@ -75,7 +78,8 @@ TEST_F(BadInput, DomainWhosePortOfDiscoveryIsTakenIsRefusedWithPortAndRemedy) {
   EXPECT_EQ(finish({easy}), 3);
 
   close(taker);
-  for (const std::string& word : {"domain " + std::to_string(domain), std::to_string(port), std::string("ROS_DOMAIN_ID")}) {
+  for (const std::string& word :
+       {"domain " + std::to_string(domain), std::to_string(port), std::string("ROS_DOMAIN_ID")}) {
     EXPECT_THAT(run->err(), HasSubstr(word));
   }
   EXPECT_THAT(run_folders(), IsEmpty());

@@ -82,9 +82,9 @@ class WorkerOfARun : public Deaths, public ::testing::WithParamInterface<int> {}
 
 TEST_P(WorkerOfARun, IsNotMissedWhenItIsGone) {
   // One plan with work enough that the victim's part of it is missed, and no other.
-  const std::string thorough = folder.write(
-      "thorough.yaml", "objective: {success_cost: 1.0e-9}\n"
-                       "control: {many_iterations: 6, few_iterations: 0}\n");
+  const std::string thorough = folder.write("thorough.yaml",
+                                            "objective: {success_cost: 1.0e-9}\n"
+                                            "control: {many_iterations: 6, few_iterations: 0}\n");
   start({easy, "--workers", "2", "--parameters", thorough});
   ASSERT_TRUE(searches()) << run->err();
   const pid_t victim = run->child("jostle_worker");
@@ -106,8 +106,7 @@ TEST_F(Deaths, RunThatIsKilledTakesItsChildrenAlong) {
   const auto start = Clock::now();
   run->signal(SIGKILL);
 
-  EXPECT_TRUE(soon(kReport, [&] { return run->left_over().empty(); }))
-      << ::testing::PrintToString(run->left_over());
+  EXPECT_TRUE(soon(kReport, [&] { return run->left_over().empty(); })) << ::testing::PrintToString(run->left_over());
   fmt::print("children gone after {:.2f} s\n", std::chrono::duration<double>(Clock::now() - start).count());
 }
 

@@ -19,7 +19,9 @@ class DiscoveryServer : public ::testing::Test {
   std::unique_ptr<ProgramProcess> start(const std::string& address, int port) {
     return std::make_unique<ProgramProcess>(
         "jostle_discovery_server",
-        std::vector<std::string>{"--domain", std::to_string(test_domain()), "--listen", address, "--port", std::to_string(port)}, folder);
+        std::vector<std::string>{"--domain", std::to_string(test_domain()), "--listen", address, "--port",
+                                 std::to_string(port)},
+        folder);
   }
 
   const TempFolder folder;
@@ -33,7 +35,8 @@ class TakenPort {
     address_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     socklen_t size = sizeof address_;
     auto* generic = reinterpret_cast<sockaddr*>(&address_);
-    if (bind(socket_, generic, size) != 0 || getsockname(socket_, generic, &size) != 0) throw std::runtime_error("no free port");
+    if (bind(socket_, generic, size) != 0 || getsockname(socket_, generic, &size) != 0)
+      throw std::runtime_error("no free port");
   }
   ~TakenPort() { close(socket_); }
   TakenPort(const TakenPort&) = delete;
@@ -51,14 +54,16 @@ TEST_F(DiscoveryServer, SaysThatItsPortIsTaken) {
   const auto server = start("127.0.0.1", port.number());
 
   EXPECT_EQ(server->wait(30s), 3);
-  EXPECT_THAT(server->err(), HasSubstr("127.0.0.1:" + std::to_string(port.number()) + ": Address already in use; wanted an address of this host"));
+  EXPECT_THAT(server->err(), HasSubstr("127.0.0.1:" + std::to_string(port.number()) +
+                                       ": Address already in use; wanted an address of this host"));
 }
 
 TEST_F(DiscoveryServer, SaysThatItsAddressIsAnotherHosts) {
   const auto server = start("192.0.2.1", 11811);  // of nobody: RFC 5737, for documentation
 
   EXPECT_EQ(server->wait(30s), 3);
-  EXPECT_THAT(server->err(), HasSubstr("192.0.2.1:11811: Cannot assign requested address; wanted an address of this host"));
+  EXPECT_THAT(server->err(),
+              HasSubstr("192.0.2.1:11811: Cannot assign requested address; wanted an address of this host"));
 }
 
 TEST_F(DiscoveryServer, ListensWhereItCan) {

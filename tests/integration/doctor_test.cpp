@@ -180,7 +180,8 @@ TEST_F(Doctor, NamesBlockedMulticast) {
   EXPECT_EQ(check("UDP")["verdict"], "ok");
   EXPECT_EQ(check("participants")["verdict"], "FAIL");
   ASSERT_EQ(check("multicast")["verdict"], "FAIL") << checks.dump(2);
-  EXPECT_THAT(check("multicast")["remedy"].get<std::string>(), StartsWith("--discovery peers:10.77.0.1,10.77.0.2 on both"));
+  EXPECT_THAT(check("multicast")["remedy"].get<std::string>(),
+              StartsWith("--discovery peers:10.77.0.1,10.77.0.2 on both"));
 }
 
 TEST_F(Doctor, NamesAWrongDomain) {
@@ -198,15 +199,16 @@ TEST_F(Doctor, NamesDifferentDiscovery) {
 TEST_F(Doctor, NamesAHostThatIsNotListed) {
   listen({"--discovery", "peers:10.77.0.2"});
   ask({"--discovery", "peers:10.77.0.1"});
-  expect_failed({"discovery", "participants"}, "peers:10.77.0.1 here does not list 10.77.0.2", "--discovery peers:10.77.0.1,10.77.0.2 on both");
+  expect_failed({"discovery", "participants"}, "peers:10.77.0.1 here does not list 10.77.0.2",
+                "--discovery peers:10.77.0.1,10.77.0.2 on both");
 }
 
 TEST_F(Doctor, NamesAServerThatIsNotThere) {
   const std::vector<std::string> way{"--discovery", "server:10.77.0.2:7777"};
   listen(way);
   ask(way);
-  expect_failed({"10.77.0.2: discovery server", "discovery server", "participants"}, "10.77.0.2:7777: nobody listens there",
-                "start `jostle discovery-server` on 10.77.0.2");
+  expect_failed({"10.77.0.2: discovery server", "discovery server", "participants"},
+                "10.77.0.2:7777: nobody listens there", "start `jostle discovery-server` on 10.77.0.2");
 }
 
 TEST_F(Doctor, KnowsIdentities) {
@@ -218,7 +220,8 @@ TEST_F(Doctor, KnowsIdentities) {
 
   ask({"--secure", keys + "/identities/robot"});
   expect_well();
-  EXPECT_THAT(check("identity")["finding"].get<std::string>(), HasSubstr("here robot (robot), there worker (worker), of one keystore"));
+  EXPECT_THAT(check("identity")["finding"].get<std::string>(),
+              HasSubstr("here robot (robot), there worker (worker), of one keystore"));
 
   ask({"--secure", others + "/identities/robot"});
   expect_failed({"identity", "participants"}, "of different keystores", "jostle keys issue");
@@ -231,9 +234,12 @@ TEST_F(Doctor, SurvivesWhateverComesToItsDoor) {
   listen();
   hosts->on(kHere, [] {
     // Lines that are no JSON, no question, of wrong types; then rubbish without an end.
-    ASSERT_EQ(std::system("for text in rubbish '{}' '{\"ask\":7}' '{\"ask\":\"send\",\"port\":-1}' '{\"ask\":\"heard\",\"text\":[],\"size\":-1}'; "
-                          "do bash -c \"exec 3<>/dev/tcp/10.77.0.2/11812; echo '$text' >&3; exec 3>&-\"; done; "
-                          "bash -c 'exec 3<>/dev/tcp/10.77.0.2/11812; head -c 1000000 /dev/zero >&3' 2>/dev/null; true"), 0);
+    ASSERT_EQ(
+        std::system("for text in rubbish '{}' '{\"ask\":7}' '{\"ask\":\"send\",\"port\":-1}' "
+                    "'{\"ask\":\"heard\",\"text\":[],\"size\":-1}'; "
+                    "do bash -c \"exec 3<>/dev/tcp/10.77.0.2/11812; echo '$text' >&3; exec 3>&-\"; done; "
+                    "bash -c 'exec 3<>/dev/tcp/10.77.0.2/11812; head -c 1000000 /dev/zero >&3' 2>/dev/null; true"),
+        0);
   });
   ask();
   expect_well();

@@ -44,7 +44,8 @@ class SeveralHosts : public RunFixture {
   // A search of so many iterations, a tenth of a second or two each.
   std::vector<std::string> planning(const std::string& name, int iterations) {
     const std::string thorough = folder.write(
-        "thorough.yaml", fmt::format("objective: {{success_cost: 1.0e-9}}\ncontrol: {{many_iterations: {}}}\n", iterations));
+        "thorough.yaml",
+        fmt::format("objective: {{success_cost: 1.0e-9}}\ncontrol: {{many_iterations: {}}}\n", iterations));
     return {easy, "--plan-only", "--headless", "--parameters", thorough, "--json", folder.path() / name};
   }
 

@@ -42,7 +42,8 @@ TEST_F(Keys, InitMakesARobotAndAWorkerThatCheckAccepts) {
   EXPECT_THAT(program->out(), HasSubstr("ok CN=robot,OU=robot,O=Jostle\n"));
   EXPECT_THAT(program->out(), HasSubstr("publishes    every topic\n"));
   EXPECT_EQ(keys({"check", store + "/identities/worker"}), 0) << program->err();
-  EXPECT_THAT(program->out(), HasSubstr("publishes    rt/pool/worker, rt/pool/result, rt/doctor/there, rt/doctor/back\nsubscribes   rt/pool/*, rt/doctor/*\n"));
+  EXPECT_THAT(program->out(), HasSubstr("publishes    rt/pool/worker, rt/pool/result, rt/doctor/there, "
+                                        "rt/doctor/back\nsubscribes   rt/pool/*, rt/doctor/*\n"));
   EXPECT_THAT(program->err(), IsEmpty());
 }
 

@@ -19,8 +19,8 @@ class Namespace : public RunFixture {
  protected:
   // The arguments of a run to its grasp; the seed decides what is planned and done.
   std::vector<std::string> grasp(const std::string& name, int seed, std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {easy, "--headless", "--workers", "1", "--parameters", plain, "--seed", std::to_string(seed), "--json",
-                               file(name)});
+    more.insert(more.begin(), {easy, "--headless", "--workers", "1", "--parameters", plain, "--seed",
+                               std::to_string(seed), "--json", file(name)});
     return more;
   }
 
@@ -30,8 +30,8 @@ class Namespace : public RunFixture {
   json deeds(const std::string& name) const {
     const json report = json::parse(contents(file(name)), nullptr, false);
     json deeds;
-    for (const char* key : {"success", "reason", "scene_hash", "seed", "plan_hash", "cost", "iterations", "replans", "actions",
-                            "observed_states"}) {
+    for (const char* key : {"success", "reason", "scene_hash", "seed", "plan_hash", "cost", "iterations", "replans",
+                            "actions", "observed_states"}) {
       deeds[key] = report.value(key, json("missing"));
     }
     return deeds;
@@ -39,7 +39,8 @@ class Namespace : public RunFixture {
 };
 
 TEST_F(Namespace, TwoRunsAtATimeGraspAsEachDoesAlone) {
-  for (const int seed : {7, 8}) ASSERT_EQ(program("jostle_run", grasp("alone-" + std::to_string(seed), seed))->wait(kPatience), 0);
+  for (const int seed : {7, 8})
+    ASSERT_EQ(program("jostle_run", grasp("alone-" + std::to_string(seed), seed))->wait(kPatience), 0);
   ASSERT_NE(deeds("alone-7"), deeds("alone-8")) << "what one did could pass for the other's";
 
   const auto left = program("jostle_run", grasp("left", 7, {"--namespace", "left"}));
@@ -56,11 +57,13 @@ TEST_F(Namespace, TopicsAreThoseOfRos2AndWorkersAreEverybodys) {
   const auto named = [](const std::string& name, const dds::Qos& qos) {
     return dds::Topic<jostle_msgs::msg::Feedback>{name, qos, dds::Scope::kDomain};
   };
-  dds::Inbox<jostle_msgs::msg::Feedback> inside(participant, named("rt/left/task/feedback", topics::kTaskFeedback.qos), 64);
+  dds::Inbox<jostle_msgs::msg::Feedback> inside(participant, named("rt/left/task/feedback", topics::kTaskFeedback.qos),
+                                                64);
   dds::Inbox<jostle_msgs::msg::Feedback> outside(participant, topics::kTaskFeedback, 64);
   const WorkerProcess worker(domain);  // without a namespace
 
-  const auto left = program("jostle_run", {easy, "--headless", "--workers", "0", "--plan-only", "--parameters", plain, "--namespace", "/left"});
+  const auto left = program("jostle_run", {easy, "--headless", "--workers", "0", "--plan-only", "--parameters", plain,
+                                           "--namespace", "/left"});
 
   EXPECT_EQ(left->wait(kPatience), 0) << left->err();
   EXPECT_TRUE(inside.take(in(1s)));
@@ -68,7 +71,8 @@ TEST_F(Namespace, TopicsAreThoseOfRos2AndWorkersAreEverybodys) {
 }
 
 TEST_F(Namespace, OfARunIsItsOwn) {
-  const auto first = program("jostle_run", {easy, "--headless", "--workers", "1", "--parameters", endless, "--namespace", "left"});
+  const auto first =
+      program("jostle_run", {easy, "--headless", "--workers", "1", "--parameters", endless, "--namespace", "left"});
   ASSERT_TRUE(first->says("planning", kPatience)) << first->err();
 
   const auto second = program("jostle_run", grasp("second", 7, {"--namespace", "left"}));
@@ -81,7 +85,8 @@ TEST_F(Namespace, OfARunIsItsOwn) {
 TEST_F(Namespace, ThatIsNoneIsRefused) {
   const auto run_result = program("jostle_run", grasp("none", 7, {"--namespace", "left-arm"}));
   EXPECT_EQ(run_result->wait(kPatience), 2);
-  EXPECT_THAT(run_result->err(), HasSubstr("namespace: got 'left-arm', wanted words of letters, digits and single underscores"));
+  EXPECT_THAT(run_result->err(),
+              HasSubstr("namespace: got 'left-arm', wanted words of letters, digits and single underscores"));
 }
 
 }  // namespace

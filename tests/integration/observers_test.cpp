@@ -59,9 +59,8 @@ TEST_F(Observers, AreNoRobotThatACommandCouldReach) {
 TEST_F(Observers, WhoOnlySpeaksLikeARobotIsReported) {
   dds::Writer<RobotStatus> speaker(participant, topics::kRobotStatus);
   services::RobotClient sut(participant, {.silence = kPatience, .start = 300ms});
-  const std::jthread speaking([&](std::stop_token stop) {
-    soon(kPatience, [&] { return !speaker.write({}) || stop.stop_requested(); });
-  });
+  const std::jthread speaking(
+      [&](std::stop_token stop) { soon(kPatience, [&] { return !speaker.write({}) || stop.stop_requested(); }); });
 
   const auto executed = sut.execute(std::array{0.05, 0.0, 0.0, 0.0}, 0.2, {});
 

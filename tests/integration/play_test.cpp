@@ -45,7 +45,8 @@ class Play : public ::testing::Test {
     std::chrono::nanoseconds offset;
     std::string text;
   };
-  void write_bag(const std::vector<bag::Topic>& topics, const std::vector<Entry>& entries, const bag::BagOptions& options = {}) {
+  void write_bag(const std::vector<bag::Topic>& topics, const std::vector<Entry>& entries,
+                 const bag::BagOptions& options = {}) {
     auto writer = taken(bag::BagWriter::create(bag, options));
     for (const bag::Topic& topic : topics) taken(writer->add_topic(topic));
     for (const auto& [topic, offset, text] : entries) {
@@ -99,7 +100,8 @@ class Play : public ::testing::Test {
   }
   std::unique_ptr<RawSubscriber> subscribe(const std::string& topic, const dds::Qos& qos = {.depth = dds::kKeepAll}) {
     const bool status = topic.ends_with("/robot/status");
-    return std::make_unique<RawSubscriber>(participant(), topic, status ? "jostle_msgs/msg/RobotStatus" : "std_msgs/msg/String", qos);
+    return std::make_unique<RawSubscriber>(participant(), topic,
+                                           status ? "jostle_msgs/msg/RobotStatus" : "std_msgs/msg/String", qos);
   }
 
   void expect_refused(const std::string& path, const std::vector<std::string>& expected) {
@@ -157,7 +159,8 @@ TEST_P(PlayRates, EveryMessageArrivesAsItWasInOrder) {
   EXPECT_EQ(report["refused"], 0);
   EXPECT_EQ(report["reason"], "played to its end");
   EXPECT_GE(report["seconds"].get<double>(), 0.636804 / std::stod(GetParam()));
-  EXPECT_THAT(player->err(), AllOf(HasSubstr("400 messages of 3 topics"), HasSubstr("(p99)"), Not(HasSubstr("another publisher"))));
+  EXPECT_THAT(player->err(),
+              AllOf(HasSubstr("400 messages of 3 topics"), HasSubstr("(p99)"), Not(HasSubstr("another publisher"))));
 }
 
 INSTANTIATE_TEST_SUITE_P(Integration, PlayRates, ::testing::Values("0.5", "1", "10"));
@@ -228,7 +231,8 @@ TEST_F(Play, ALateSubscriberAfterASeekGetsTheSceneAndTheStateOfThatMoment) {
   const auto kept = subscribe("/robot/status", kAsksForKept);
   const auto plain = subscribe("/robot/status");
   const auto notes = subscribe("/notes");
-  ASSERT_TRUE(soon(kPatience, [&] { return scene->count() >= 1 && kept->count() >= 1 && plain->count() >= 1; })) << player->err();
+  ASSERT_TRUE(soon(kPatience, [&] { return scene->count() >= 1 && kept->count() >= 1 && plain->count() >= 1; }))
+      << player->err();
 
   tell({"step"});  // the next one of all is state3, the one after note3
   ASSERT_TRUE(soon(kPatience, [&] { return plain->texts().back() == "state3"; }));
@@ -246,7 +250,8 @@ TEST_F(Play, ALateSubscriberAfterASeekGetsTheSceneAndTheStateOfThatMoment) {
 }
 
 TEST_F(Play, ASeekBackTakesBackWhatHadNotHappenedYet) {
-  write_bag({string_topic("/first"), string_topic("/late", dds::kLatched)}, {{0, 0ms, "f"}, {1, 1s, "late"}, {0, 2s, "g"}});
+  write_bag({string_topic("/first"), string_topic("/late", dds::kLatched)},
+            {{0, 0ms, "f"}, {1, 1s, "late"}, {0, 2s, "g"}});
   start_and_wait({"--paused"});
   tell({"step", "step", "seek:0.5"});
   const auto late = subscribe("/late", {.latched = true, .depth = 1});
@@ -287,7 +292,9 @@ TEST_F(Play, LoopsUntilTold) {
 // ---------------------------------------------------------------- topics
 
 TEST_F(Play, RemapsGlobsAndLeavesCommandsOut) {
-  write_bag({string_topic("/a/x"), string_topic("/a/y"), string_topic("/b"),
+  write_bag({string_topic("/a/x"),
+             string_topic("/a/y"),
+             string_topic("/b"),
              {.name = "/robot/command", .type = "jostle_msgs/msg/VelocityCommand", .qos = dds::kCommand}},
             {{0, 0ms, "x"}, {1, 0ms, "y"}, {2, 0ms, "b"}, {3, 0ms, "c"}});
   const RawSubscriber command(participant(), "/robot/command", "jostle_msgs/msg/VelocityCommand");
@@ -340,7 +347,8 @@ TEST_F(Play, WaitsForSubscribersAndSaysWhoseAreMissing) {
   write_run();
   start({"--wait-for-subscribers=2", "--timeout", "0.3"});
   EXPECT_EQ(player->wait(kPatience), 3);
-  EXPECT_THAT(player->err(), HasSubstr("got fewer than 2 subscribers of /notes, /robot/status, /task/run within 0.3 s"));
+  EXPECT_THAT(player->err(),
+              HasSubstr("got fewer than 2 subscribers of /notes, /robot/status, /task/run within 0.3 s"));
 
   const auto first = subscribe("/notes");
   start({"--wait-for-subscribers=2", "--rate", "100", "/notes"});
@@ -357,7 +365,8 @@ TEST_F(Play, ForeignFilesGetAClearError) {
   expect_refused(folder.path() / "nowhere", {"nowhere: not there"});
   expect_refused(folder.write("notes.txt", "buy milk"), {"notes.txt", "wanted .mcap or .db3"});
   expect_refused(folder.write("picture.png", "\x89PNG\r\n\x1a\n"), {"picture.png", "wanted .mcap or .db3"});
-  expect_refused(folder.write("picture.mcap", "\x89PNG\r\n\x1a\n and more"), {"picture.mcap: byte 0", "wanted the beginning of an MCAP"});
+  expect_refused(folder.write("picture.mcap", "\x89PNG\r\n\x1a\n and more"),
+                 {"picture.mcap: byte 0", "wanted the beginning of an MCAP"});
   expect_refused(folder.write("nothing.mcap", ""), {"nothing.mcap", "empty"});
   expect_refused(folder.write("words.db3", "no database at all, but long enough to be read as one"), {"words.db3"});
   fs::create_directory(folder.path() / "bare");
@@ -420,7 +429,8 @@ TEST_F(Play, DamageInTheMiddleEndsThePlaybackThere) {
 TEST_F(Play, KeysSteerAndTheTerminalIsRestoredAfterCtrlC) {
   write_run();
   const auto notes = subscribe("/notes");
-  TerminalProcess sut("jostle_play", {bag, "/notes", "--paused", "--domain", std::to_string(domain), "--wait-for-subscribers=1"});
+  TerminalProcess sut("jostle_play",
+                      {bag, "/notes", "--paused", "--domain", std::to_string(domain), "--wait-for-subscribers=1"});
   ASSERT_TRUE(sut.is_plain());
   ASSERT_TRUE(sut.shows("space pause", kPatience)) << sut.screen();
   ASSERT_TRUE(sut.shows("  paused", kPatience)) << sut.screen();

@@ -47,12 +47,14 @@ class PoolSharing : public ::testing::Test {
   }
 
   std::future<Result<BatchReply>> run_aside(Client& client, const RolloutBatch& batch, std::stop_token stop = {}) {
-    return std::async(std::launch::async, [&client, batch, stop] { return client.pool.run(batch, in(kPatience), stop); });
+    return std::async(std::launch::async,
+                      [&client, batch, stop] { return client.pool.run(batch, in(kPatience), stop); });
   }
 
   // Seconds of work that clients[0 … n-2], which have work without end, were given
   // while clients[n-1] had all of `last` done.
-  std::vector<double> served_meanwhile(const std::vector<std::chrono::milliseconds>& lengths, const RolloutBatch& last) {
+  std::vector<double> served_meanwhile(const std::vector<std::chrono::milliseconds>& lengths,
+                                       const RolloutBatch& last) {
     std::stop_source stop;
     std::vector<std::future<Result<BatchReply>>> endless;
     for (std::size_t i = 0; i < lengths.size(); ++i) {
@@ -70,7 +72,8 @@ class PoolSharing : public ::testing::Test {
       const auto samples = static_cast<double>(clients[i].rollouts() - before[i]);
       served.push_back(samples * std::chrono::duration<double>(lengths[i]).count());
     }
-    for (std::size_t i = 0; i < served.size(); ++i) RecordProperty("served_" + std::to_string(i), std::to_string(served[i]));
+    for (std::size_t i = 0; i < served.size(); ++i)
+      RecordProperty("served_" + std::to_string(i), std::to_string(served[i]));
     stop.request_stop();
     for (auto& reply : endless) EXPECT_EQ(reply.get().error().code, Code::kCancelled);
     return served;

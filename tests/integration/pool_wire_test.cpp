@@ -110,7 +110,10 @@ TEST_F(PoolWire, MalformedTaskIsAnsweredWithTheFieldsName) {
       {"wait", [](Task& t) { t.batch().wait(-2); }},
       {"priority", [](Task& t) { t.batch().priority(2); }},
       {"task.samples", [](Task& t) { t.samples({}); }},
-      {"task.samples", [](Task& t) { t.samples({0, 7}); }},
+      {"task.samples",
+       [](Task& t) {
+         t.samples({0, 7});
+       }},
       {"task.samples", [](Task& t) { t.samples(std::vector<std::uint32_t>(100'000, 0)); }},
       {"task.best_cost", [](Task& t) { t.best_cost(kNaN); }},
   };

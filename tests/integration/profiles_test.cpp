@@ -14,11 +14,11 @@
 #include "tests/support/program_process.hpp"
 #include "tests/support/worker_process.hpp"
 
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 
 namespace jostle::tests {
 namespace {
@@ -66,12 +66,14 @@ TEST_F(Profiles, ShippedOnesOfTopicsSayWhatTheCodeSays) {
     const std::string name(kind.kind);
     DataWriterQos writer, writer_in_file;
     dds::apply_to_writer(kind, writer);
-    ASSERT_EQ(participant.core().publisher->get_datawriter_qos_from_profile(name, writer_in_file), ReturnCode_t::RETCODE_OK);
+    ASSERT_EQ(participant.core().publisher->get_datawriter_qos_from_profile(name, writer_in_file),
+              ReturnCode_t::RETCODE_OK);
     EXPECT_TRUE(writer_in_file == writer);
 
     DataReaderQos reader, reader_in_file;
     dds::apply(kind, reader);
-    ASSERT_EQ(participant.core().subscriber->get_datareader_qos_from_profile(name, reader_in_file), ReturnCode_t::RETCODE_OK);
+    ASSERT_EQ(participant.core().subscriber->get_datareader_qos_from_profile(name, reader_in_file),
+              ReturnCode_t::RETCODE_OK);
     EXPECT_TRUE(reader_in_file == reader);
   }
 }
@@ -80,7 +82,8 @@ TEST_F(Profiles, ShippedOnesOfParticipantsSayWhatTheCodeSays) {
   for (const std::string name : {"udp", "shared_memory"}) {
     SCOPED_TRACE(name);
     DomainParticipantQos built_in = dds::built_in_participant(name).value(), in_file;
-    ASSERT_EQ(DomainParticipantFactory::get_instance()->get_participant_qos_from_profile(name, in_file), ReturnCode_t::RETCODE_OK);
+    ASSERT_EQ(DomainParticipantFactory::get_instance()->get_participant_qos_from_profile(name, in_file),
+              ReturnCode_t::RETCODE_OK);
     auto &transports = built_in.transport().user_transports, &in_file_transports = in_file.transport().user_transports;
     ASSERT_EQ(in_file_transports.size(), transports.size());
     for (std::size_t i = 0; i < transports.size(); ++i) {
@@ -104,7 +107,9 @@ TEST_F(Profiles, ShippedOnesOfParticipantsSayWhatTheCodeSays) {
 }
 
 TEST_F(Profiles, EveryTopicIsOfAKindThatTheFileHas) {
-  const auto has = [](const dds::Qos& qos) { return std::ranges::find(dds::kKinds, qos.kind, &dds::Qos::kind) != dds::kKinds.end(); };
+  const auto has = [](const dds::Qos& qos) {
+    return std::ranges::find(dds::kKinds, qos.kind, &dds::Qos::kind) != dds::kKinds.end();
+  };
   EXPECT_TRUE(has(topics::kTaskGoal.qos) && has(topics::kTaskResult.qos) && has(topics::kRobotStatus.qos) &&
               has(topics::kPoolWorld.qos) && has(topics::pool_task(1).qos));
 }
@@ -203,7 +208,8 @@ TEST_F(Profiles, TransportThatNobodyDefinesIsRefused) {
   unsetenv("JOSTLE_DDS_TRANSPORT");
 
   ASSERT_FALSE(result);
-  EXPECT_THAT(result.error().message, HasSubstr("JOSTLE_DDS_TRANSPORT: got 'carrier_pigeon', wanted udp, shared_memory"));
+  EXPECT_THAT(result.error().message,
+              HasSubstr("JOSTLE_DDS_TRANSPORT: got 'carrier_pigeon', wanted udp, shared_memory"));
 }
 
 struct Mistake {
@@ -234,20 +240,28 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         Mistake{"NoNumber", "<depth>512</depth>", "<depth>many</depth>", "<depth>: got 'many', wanted a whole number"},
         Mistake{"Nothing", "<depth>512</depth>", "<depth></depth>", "<depth>: got nothing, wanted a whole number"},
-        Mistake{"NoDepth", "<depth>512</depth>", "<depth>0</depth>", "<data_writer>: got 'task', depth 0, wanted at least 1", -2},
-        Mistake{"WrongKind", "<kind>RELIABLE</kind>", "<kind>SURE</kind>", "<kind>: got 'SURE', wanted RELIABLE or BEST_EFFORT"},
-        Mistake{"WrongHistory", "<kind>KEEP_LAST</kind>", "<kind>KEEP_SOME</kind>", "<kind>: got 'KEEP_SOME', wanted KEEP_LAST or KEEP_ALL"},
-        Mistake{"UnknownElement", "<depth>512</depth>", "<deepness>512</deepness>", "<deepness>: got '512', wanted what Fast DDS takes there"},
+        Mistake{"NoDepth", "<depth>512</depth>", "<depth>0</depth>",
+                "<data_writer>: got 'task', depth 0, wanted at least 1", -2},
+        Mistake{"WrongKind", "<kind>RELIABLE</kind>", "<kind>SURE</kind>",
+                "<kind>: got 'SURE', wanted RELIABLE or BEST_EFFORT"},
+        Mistake{"WrongHistory", "<kind>KEEP_LAST</kind>", "<kind>KEEP_SOME</kind>",
+                "<kind>: got 'KEEP_SOME', wanted KEEP_LAST or KEEP_ALL"},
+        Mistake{"UnknownElement", "<depth>512</depth>", "<deepness>512</deepness>",
+                "<deepness>: got '512', wanted what Fast DDS takes there"},
         Mistake{"BadBuffer", "<receiveBufferSize>4194304<", "<receiveBufferSize>4 MiB<",
                 "<receiveBufferSize>: got '4 MiB', wanted a whole number"},
-        Mistake{"BadSegment", "<segment_size>8388608<", "<segment_size>big<", "<segment_size>: got 'big', wanted a whole number"},
-        Mistake{"BadTransport", "<type>UDPv4<", "<type>UDPv5<", "<type>: got 'UDPv5', wanted what Fast DDS takes there: Invalid transport type"},
-        Mistake{"NoSuchTransport", "<transport_id>udp</transport_id></userTransports>", "<transport_id>tcp</transport_id></userTransports>",
-                "<transport_id>: got 'tcp', wanted"},
+        Mistake{"BadSegment", "<segment_size>8388608<", "<segment_size>big<",
+                "<segment_size>: got 'big', wanted a whole number"},
+        Mistake{"BadTransport", "<type>UDPv4<", "<type>UDPv5<",
+                "<type>: got 'UDPv5', wanted what Fast DDS takes there: Invalid transport type"},
+        Mistake{"NoSuchTransport", "<transport_id>udp</transport_id></userTransports>",
+                "<transport_id>tcp</transport_id></userTransports>", "<transport_id>: got 'tcp', wanted"},
         Mistake{"BadLease", "<sec>2<", "<sec>two<", "<sec>: got 'two', wanted"},
         Mistake{"UnknownKind", "profile_name=\"task\"", "profile_name=\"tsak\"",
-                "<data_writer>: got 'tsak', wanted one of: task, command, answer, latched, stream, state, catalogue; or a topic"},
-        Mistake{"Twice", "profile_name=\"answer\"", "profile_name=\"task\"", "<data_writer>: got 'task' again, wanted each name once"},
+                "<data_writer>: got 'tsak', wanted one of: task, command, answer, latched, stream, state, catalogue; "
+                "or a topic"},
+        Mistake{"Twice", "profile_name=\"answer\"", "profile_name=\"task\"",
+                "<data_writer>: got 'task' again, wanted each name once"},
         Mistake{"NoName", " profile_name=\"task\"", "", "<data_writer>: got no name, wanted profile_name"},
         Mistake{"NeverMeet", "<kind>RELIABLE</kind>", "<kind>BEST_EFFORT</kind>",
                 "<data_reader>: got 'task', readers RELIABLE and writers BEST_EFFORT, wanted no more from readers", 8},
@@ -262,7 +276,8 @@ TEST(BrokenProfilesOf, SeveralMistakesNameTheFirst) {
   for (std::size_t at = text.find("<depth>"), n = 0; at != std::string::npos; at = text.find("<depth>", at + 1), ++n) {
     if (n < 4) continue;
     text.replace(at, 8, "<depth>x");
-    if (line == 0) line = 1 + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+    if (line == 0)
+      line = 1 + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
   }
   const auto result = dds::load_profiles({.path = folder.write("broken.xml", text)});
 
@@ -275,7 +290,8 @@ TEST(BrokenProfilesOf, AProgramEndItAsBadInput) {
   const Edited edited = edit("<depth>512</depth>", "<depth>many</depth>");
   const std::string file = folder.write("broken.xml", edited.text);
 
-  ProgramProcess worker("jostle_worker", {"--domain", std::to_string(test_domain())}, folder, {{"JOSTLE_PROFILES", file}});
+  ProgramProcess worker("jostle_worker", {"--domain", std::to_string(test_domain())}, folder,
+                        {{"JOSTLE_PROFILES", file}});
 
   EXPECT_EQ(worker.wait(10s), 2);
   EXPECT_THAT(worker.err() + worker.out(),

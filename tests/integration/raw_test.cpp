@@ -22,7 +22,8 @@ const dds::RawTopic kStatus{"rt/robot/status", "jostle_msgs::msg::dds_::RobotSta
 const dds::RawTopic kNumbers{"rt/numbers", "test_msgs::msg::dds_::Number_", dds::kCommand};
 
 std::vector<std::byte> number(std::uint8_t value) {
-  return {std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}, std::byte{value}, std::byte{0}, std::byte{0}, std::byte{0}};
+  return {std::byte{0},     std::byte{1}, std::byte{0}, std::byte{0},
+          std::byte{value}, std::byte{0}, std::byte{0}, std::byte{0}};
 }
 
 // Keeps what a raw reader gets.
@@ -152,7 +153,8 @@ TEST_F(Raw, KeyedTypesAreTakenWhereTheKeyCanBeFound) {
   EXPECT_FALSE(dds::can_be_raw(world, false));
   EXPECT_TRUE(dds::can_be_raw(kNumbers.type, false));
   EXPECT_FALSE(dds::can_be_raw(kNumbers.type, true));
-  const auto run_of = program("jostle_run", {easy, "--parameters", plain, "--plan-only", "--headless", "--workers", "1"});
+  const auto run_of =
+      program("jostle_run", {easy, "--parameters", plain, "--plan-only", "--headless", "--workers", "1"});
   Heap heap;
   const dds::RawReader sut(*participant, {topics::kPoolWorld.name, world, topics::kPoolWorld.qos},
                            [&](auto bytes, const auto& origin) { heap.put(bytes, origin); });

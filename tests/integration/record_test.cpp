@@ -1,11 +1,11 @@
 // jostle record as a user starts it, beside publishers of this test: nothing is lost, and what
 // is lost is counted.
 
-#include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <gmock/gmock.h>
 #include <sched.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
+#include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 
 #include <nlohmann/json.hpp>
 #include <set>
@@ -44,7 +44,8 @@ std::string text(int i, std::size_t size = 7) {
 // those of a string whatever the type: a recorder does not look into them.
 class Publisher {
  public:
-  Publisher(int domain, const std::string& topic, const dds::Qos& qos, const std::string& type = "sensor_msgs/msg/JointState")
+  Publisher(int domain, const std::string& topic, const dds::Qos& qos,
+            const std::string& type = "sensor_msgs/msg/JointState")
       : participant_(dds::Participant::open({.domain = domain}).value()),
         writer_(participant_, {dds::wire_topic(topic), *dds::wire_type(type), qos}) {}
 
@@ -194,7 +195,8 @@ TEST_F(Record, NamesTypesItDoesNotKnowAndLeavesThemOut) {
   record({"/x", "/y"});
   Publisher unknown(domain, "/x", kDeep, "robots_of_others_msgs/msg/Wheel"), known(domain, "/y", kDeep);
 
-  EXPECT_TRUE(recorder->says("/x: the definition of type robots_of_others_msgs/msg/Wheel is unknown; left out", kPatience))
+  EXPECT_TRUE(
+      recorder->says("/x: the definition of type robots_of_others_msgs/msg/Wheel is unknown; left out", kPatience))
       << recorder->err();
   ASSERT_TRUE(known.is_heard());
   known.write(1);
@@ -373,8 +375,8 @@ TEST_F(Record, SmallDiskThatFillsUpEndsItCleanlyWithWhatFits) {
 
 TEST_F(Record, EndsBeforeASmallDiskIsFullAndNothingItTookIsLost) {
   on_a_small_disk(folder.path() / "disk", 24'000'000, [&] {
-    recorder = program("jostle_record", {"/x", "--no-compress", "--min-free", "12MB", "--json", folder.path() / "record.json", "-o",
-                                         folder.path() / "disk" / "bag"});
+    recorder = program("jostle_record", {"/x", "--no-compress", "--min-free", "12MB", "--json",
+                                         folder.path() / "record.json", "-o", folder.path() / "disk" / "bag"});
     ASSERT_TRUE(recorder->says("ready", kPatience)) << recorder->err();
     Publisher x(domain, "/x", kDeep);
     ASSERT_TRUE(x.is_heard());
@@ -460,11 +462,13 @@ TEST_F(Record, TakesKeyedTopicsOfTheSystemWhenAskedTo) {
 TEST_F(Record, OfAWholeRunIsOneOption) {
   const std::string result = folder.path() / "result.json";
 
-  ASSERT_EQ(finish({easy, "--workers", "1", "--parameters", plain, "--record", bag(), "--json", result}), 0) << run->err();
+  ASSERT_EQ(finish({easy, "--workers", "1", "--parameters", plain, "--record", bag(), "--json", result}), 0)
+      << run->err();
 
   EXPECT_EQ(messages_of("/task/goal", bag()).size(), 1u);
   EXPECT_EQ(messages_of("/task/result", bag()).size(), 1u);
-  EXPECT_EQ(messages_of("/robot/command", bag()).size(), json::parse(contents(result))["actions"].get<std::size_t>() + 1);
+  EXPECT_EQ(messages_of("/robot/command", bag()).size(),
+            json::parse(contents(result))["actions"].get<std::size_t>() + 1);
   EXPECT_THAT(topics_of(bag()), Not(Contains(HasSubstr("/pool/"))));
   auto notes = notes_of(bag());
   for (const auto& [topic, lost] : notes["lost"]) EXPECT_EQ(lost, "0") << topic;

@@ -17,10 +17,11 @@ class RecordedRuns : public RunFixture {
   // Twelve short steps, each re-planned as no plan is good enough, in a world that is not
   // quite as believed.
   void record(const std::string& name) {
-    const auto parameters = folder.write("restless.yaml", "planner: {rollouts: 2}\n"
-                                                          "objective: {success_cost: 1.0e-9}\n"
-                                                          "control: {many_iterations: 4, few_iterations_max: 1, initial_steps: 12, "
-                                                          "deviation_threshold: 0, timeout: 120}\n");
+    const auto parameters = folder.write("restless.yaml",
+                                         "planner: {rollouts: 2}\n"
+                                         "objective: {success_cost: 1.0e-9}\n"
+                                         "control: {many_iterations: 4, few_iterations_max: 1, initial_steps: 12, "
+                                         "deviation_threshold: 0, timeout: 120}\n");
     finish({easy, "--uncertainty", "low", "--seed", "5", "--workers", "2", "--parameters", parameters, "--json",
             folder.path() / (name + ".json"), "--record", folder.path() / name});
     ASSERT_TRUE(std::filesystem::exists(folder.path() / name / "metadata.yaml")) << run->err();
@@ -73,7 +74,8 @@ TEST_F(RecordedRuns, AreDrawnAsSheetPicturesAndFilms) {
   const auto sheet = folder.path() / "run.png", pictures = folder.path() / "pictures";
 
   EXPECT_EQ(program_ends("jostle_render", {bag("run"), "-o", sheet, "--frames", "3", "--size", "160x120"}), 0) << err;
-  EXPECT_EQ(program_ends("jostle_render", {bag("run"), "-o", pictures, "--frames", "4", "--size", "160x120"}), 0) << err;
+  EXPECT_EQ(program_ends("jostle_render", {bag("run"), "-o", pictures, "--frames", "4", "--size", "160x120"}), 0)
+      << err;
 
   EXPECT_TRUE(std::filesystem::exists(sheet));
   EXPECT_TRUE(std::filesystem::exists(pictures / "frame-00004.png"));

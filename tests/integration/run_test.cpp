@@ -35,9 +35,9 @@ TEST_F(Run, GraspsTheTargetOfAnEasySceneAndTellsAll) {
   ASSERT_EQ(finish({easy, "--workers", "2", "--seed", "7", "--json", result_file()}), 0) << run->err();
 
   const json report = result();
-  for (const char* key : {"success", "reason", "scene_hash", "seed", "controller", "uncertainty", "pool",
-                          "workers", "plan_hash", "cost", "iterations", "replans", "actions",
-                          "plan_seconds", "total_seconds", "rollouts", "dropped_objects"}) {
+  for (const char* key :
+       {"success", "reason", "scene_hash", "seed", "controller", "uncertainty", "pool", "workers", "plan_hash", "cost",
+        "iterations", "replans", "actions", "plan_seconds", "total_seconds", "rollouts", "dropped_objects"}) {
     EXPECT_TRUE(report.contains(key)) << key;
   }
   EXPECT_EQ(report["success"], true);
@@ -85,15 +85,18 @@ TEST_F(Run, PushesTheTargetToItsGoalAndTellsAll) {
 
 TEST_F(Run, PushesAlikeWithThreadsAndWorkers) {
   const auto scene = folder.write("push.yaml", physics_pool::to_yaml(push_around()));
-  const auto parameters = folder.write("never.yaml", "planner: {rollouts: 8, sigma: [0.01, 0.01], limit: [0.1, 0.1]}\n"
-                                                     "objective: {success_cost: 1.0e-9}\nmpc: {first_iterations: 3}\n");
+  const auto parameters = folder.write("never.yaml",
+                                       "planner: {rollouts: 8, sigma: [0.01, 0.01], limit: [0.1, 0.1]}\n"
+                                       "objective: {success_cost: 1.0e-9}\nmpc: {first_iterations: 3}\n");
   std::set<double> costs;
   for (const char* predictor : {"fine", "parareal:1,planar", "coarse,kinematic"}) {
     std::optional<json> first;
     for (const char* pool : {"threads", "dds"}) {
       SCOPED_TRACE(fmt::format("{} {}", predictor, pool));
-      ASSERT_EQ(finish({scene, "--plan-only", "--predictor", predictor, "--pool", pool, "--parameters", parameters, "--json",
-                        result_file()}), 1) << run->err();  // no plan is good enough
+      ASSERT_EQ(finish({scene, "--plan-only", "--predictor", predictor, "--pool", pool, "--parameters", parameters,
+                        "--json", result_file()}),
+                1)
+          << run->err();  // no plan is good enough
 
       const json report = result();
       if (!first) first = report;
@@ -112,15 +115,15 @@ TEST_F(Run, NamesTheSceneByTheHashThatCheckPrints) {
   const auto check = program("jostle_scene", {"check", easy});
   ASSERT_EQ(check->wait(kPatience), 0);
 
-  ASSERT_EQ(finish({easy, "--parameters", plain, "--plan-only", "--pool", "threads", "--json",
-                    result_file()}), 0) << run->err();
+  ASSERT_EQ(finish({easy, "--parameters", plain, "--plan-only", "--pool", "threads", "--json", result_file()}), 0)
+      << run->err();
 
   EXPECT_EQ("ok " + result()["scene_hash"].get<std::string>() + "\n", check->out());
 }
 
 TEST_F(Run, PlanOnlyMovesNothing) {
-  ASSERT_EQ(finish({easy, "--parameters", plain, "--plan-only", "--workers", "1", "--json",
-                    result_file()}), 0) << run->err();
+  ASSERT_EQ(finish({easy, "--parameters", plain, "--plan-only", "--workers", "1", "--json", result_file()}), 0)
+      << run->err();
 
   EXPECT_EQ(result()["actions"], 0);
   EXPECT_EQ(result()["replans"], 0);
@@ -128,8 +131,10 @@ TEST_F(Run, PlanOnlyMovesNothing) {
 }
 
 TEST_F(Run, NaiveReplanningWithThreadsUnderUncertainty) {
-  ASSERT_EQ(finish({easy, "--parameters", plain, "--controller", "nr", "--pool", "threads",
-                    "--uncertainty", "low", "--json", result_file()}), 0) << run->err();
+  ASSERT_EQ(finish({easy, "--parameters", plain, "--controller", "nr", "--pool", "threads", "--uncertainty", "low",
+                    "--json", result_file()}),
+            0)
+      << run->err();
 
   EXPECT_EQ(result()["controller"], "nr");
   EXPECT_EQ(result()["pool"], "threads");
@@ -151,8 +156,8 @@ TEST_P(RunWith, PlanIsTheSameForEveryPoolAndWhenAWorkerDies) {
     const char *pool, *workers;
     bool kill_one;
   };
-  const std::vector<std::string> task{easy, "--plan-only", "--parameters", never_content(GetParam()), "--json",
-                                      result_file()};
+  const std::vector<std::string> task{easy,     "--plan-only", "--parameters", never_content(GetParam()),
+                                      "--json", result_file()};
   std::optional<json> first;
   for (const Case& c : {Case{"threads", "1", false}, Case{"threads", "2", false}, Case{"dds", "1", false},
                         Case{"dds", "2", false}, Case{"dds", "2", true}}) {

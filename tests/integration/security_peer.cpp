@@ -13,6 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstring>
@@ -28,7 +29,6 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <string>
 #include <vector>
 
@@ -79,7 +79,8 @@ class Words final : public TopicDataType {
   }
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
     if (payload->length < kHeader) return false;
-    static_cast<std::string*>(data)->assign(reinterpret_cast<char*>(payload->data) + kHeader, payload->length - kHeader);
+    static_cast<std::string*>(data)->assign(reinterpret_cast<char*>(payload->data) + kHeader,
+                                            payload->length - kHeader);
     return true;
   }
   std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
@@ -112,14 +113,16 @@ void protect_unchecked(DomainParticipantQos& qos, const Arguments& arguments) {
     qos.properties().properties().emplace_back(name, value);
   };
   const std::string folder = "file://" + arguments.raw + "/";
-  const std::string authentication = "dds.sec.auth.builtin.PKI-DH.", access = "dds.sec.access.builtin.Access-Permissions.";
+  const std::string authentication = "dds.sec.auth.builtin.PKI-DH.",
+                    access = "dds.sec.access.builtin.Access-Permissions.";
   add("dds.sec.auth.plugin", "builtin.PKI-DH");
   add(authentication + "identity_ca", folder + "ca.pem");
   add(authentication + "identity_certificate", folder + "cert.pem");
   add(authentication + "private_key", folder + "key.pem");
   if (!arguments.no_crl) add(authentication + "identity_crl", folder + "crl.pem");
   add("dds.sec.access.plugin", "builtin.Access-Permissions");
-  add(access + "permissions_ca", arguments.permissions_ca.empty() ? folder + "ca.pem" : "file://" + arguments.permissions_ca);
+  add(access + "permissions_ca",
+      arguments.permissions_ca.empty() ? folder + "ca.pem" : "file://" + arguments.permissions_ca);
   add(access + "governance", folder + "governance.p7s");
   add(access + "permissions", folder + "permissions.p7s");
   add("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");

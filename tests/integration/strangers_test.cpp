@@ -78,7 +78,8 @@ class Peer {
   std::optional<int> wait() { return process_.wait(kPatience); }
 
  private:
-  static Words arguments(const std::string& name, const Words& credentials, const Words& publish, const Words& subscribe) {
+  static Words arguments(const std::string& name, const Words& credentials, const Words& publish,
+                         const Words& subscribe) {
     Words words{"--domain", std::to_string(test_domain()), "--name", name};
     words.insert(words.end(), credentials.begin(), credentials.end());
     for (const std::string& topic : publish) words.insert(words.end(), {"--publish", topic});
@@ -158,13 +159,16 @@ TEST_F(Strangers, WhoseIdentityExpiredAreKeptApartWhateverTheirClocksSay) {
                                                         security::make_serial(), period);
     security::Grant grant = full_grant(security::name_of(X509_get_subject_name(certificate.get())));
     grant.validity = period;
-    const auto sign = [&](const std::string& text) { return security::sign_text(*authority.certificate, *authority.key, text); };
+    const auto sign = [&](const std::string& text) {
+      return security::sign_text(*authority.certificate, *authority.key, text);
+    };
     overwrite(place / "ca.pem", security::to_pem(*authority.certificate));
     overwrite(place / "cert.pem", security::to_pem(*certificate));
     overwrite(place / "key.pem", security::to_pem(*key));
     overwrite(place / "governance.p7s", sign(security::governance_text()));
     overwrite(place / "permissions.p7s", sign(security::permissions_text(grant)));
-    overwrite(place / "crl.pem", security::to_pem(*security::make_revocation_list(authority, {}, {now - 30 * kDay, now + 30 * kDay})));
+    overwrite(place / "crl.pem",
+              security::to_pem(*security::make_revocation_list(authority, {}, {now - 30 * kDay, now + 30 * kDay})));
   }
   for (Words* words : {&one, &two}) words->insert(words->end(), fortnight_ago.begin(), fortnight_ago.end());
 
@@ -207,12 +211,14 @@ TEST_F(Strangers, WhoseIdentityWasRevokedAreHeardByWhoHasAnOldList) {
 TEST_F(Strangers, WithPermissionsOfTheirOwnMakingAreKeptApart) {
   const security::Authority rogue =
       security::make_authority("Rogue", {std::time(nullptr) - 86'400, std::time(nullptr) + 86'400});
-  const std::string both = folder.write("both.pem", contents(lab.folder() / "ca" / "ca.pem") + security::to_pem(*rogue.certificate));
+  const std::string both =
+      folder.write("both.pem", contents(lab.folder() / "ca" / "ca.pem") + security::to_pem(*rogue.certificate));
   std::vector<Words> credentials;
   for (const char* name : {"helper", "other-helper"}) {
     const fs::path identity = lab.issue(name, Role::kWorker);
     overwrite(identity / "permissions.p7s",
-              security::sign_text(*rogue.certificate, *rogue.key, security::permissions_text(full_grant(subject_of(identity)))));
+              security::sign_text(*rogue.certificate, *rogue.key,
+                                  security::permissions_text(full_grant(subject_of(identity)))));
     credentials.push_back({"--raw", identity.string(), "--permissions-ca", both});
   }
 
@@ -272,12 +278,14 @@ TEST_F(Roles, WorkerThatDisarmsItsOwnSideIsStillRefusedByRobots) {
   const fs::path helper = lab.issue("helper", Role::kWorker);
   const security::Authority rogue =
       security::make_authority("Rogue", {std::time(nullptr) - 86'400, std::time(nullptr) + 86'400});
-  const std::string both = folder.write("both.pem", contents(lab.folder() / "ca" / "ca.pem") + security::to_pem(*rogue.certificate));
+  const std::string both =
+      folder.write("both.pem", contents(lab.folder() / "ca" / "ca.pem") + security::to_pem(*rogue.certificate));
   std::string governance = security::governance_text();
   const std::size_t begin = governance.find("<topic_rule>"), end = governance.find("</topic_access_rules>");
   std::string open = governance.substr(begin, end - begin);
   const auto change = [](std::string& text, const std::string& from, const std::string& to) {
-    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) text.replace(at, from.size(), to);
+    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+      text.replace(at, from.size(), to);
   };
   change(open, "<topic_expression>*<", "<topic_expression>rt/robot/*<");
   change(open, "read_access_control>true<", "read_access_control>false<");
@@ -287,7 +295,8 @@ TEST_F(Roles, WorkerThatDisarmsItsOwnSideIsStillRefusedByRobots) {
 
   Peer robot(folder, "robot", secure(arm), {kTask, kCommand}, {kResult, kCommand});
   Peer other(folder, "other", secure(other_arm), {kCommand}, {});
-  Peer worker(folder, "worker", {"--raw", helper.string(), "--permissions-ca", both}, {kResult, kCommand}, {kTask, kCommand});
+  Peer worker(folder, "worker", {"--raw", helper.string(), "--permissions-ca", both}, {kResult, kCommand},
+              {kTask, kCommand});
   ASSERT_TRUE(worker.is_ready()) << worker.out() << worker.err();
   EXPECT_THAT(worker.out(), Not(HasSubstr("refused")));
 
@@ -309,7 +318,8 @@ TEST_F(Roles, ObserverHearsEverythingAndSaysNothing) {
 }
 
 TEST_F(Roles, ServerJoinsAndSaysAndHearsNothing) {
-  Peer server(folder, "server", secure(lab.issue("meeting-point", Role::kServer)), {kCommand, kResult}, {kCommand, kTask});
+  Peer server(folder, "server", secure(lab.issue("meeting-point", Role::kServer)), {kCommand, kResult},
+              {kCommand, kTask});
 
   ASSERT_TRUE(server.is_ready()) << server.out() << server.err();
 

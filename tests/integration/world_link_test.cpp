@@ -16,9 +16,9 @@ namespace {
 
 using namespace std::chrono_literals;
 using namespace jostle_msgs::msg;
-using ::testing::HasSubstr;
 using services::ObjectsClient;
 using services::RobotClient;
+using ::testing::HasSubstr;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr services::WorldClientOptions kImpatient{.silence = 300ms, .start = 500ms};
@@ -147,10 +147,19 @@ class SimulatedWorldProcess : public WorldLink {
 
 TEST_F(SimulatedWorldProcess, RefusesBadCommandsByFieldAndTakesTheNextGoodOne) {
   const std::pair<const char*, std::function<void(VelocityCommand&)>> cases[] = {
-      {"velocities: got 3 values, wanted 4", [](auto& c) { c.velocities({0.0, 0.0, 0.0}); }},
+      {"velocities: got 3 values, wanted 4",
+       [](auto& c) {
+         c.velocities({0.0, 0.0, 0.0});
+       }},
       {"velocities: got 64 values, wanted 4", [](auto& c) { c.velocities(std::vector<double>(64, 0.0)); }},
-      {"velocities[2]: got nan", [](auto& c) { c.velocities({0.0, 0.0, kNaN, 0.0}); }},
-      {"velocities[0]: got 1e+300", [](auto& c) { c.velocities({1e300, 0.0, 0.0, 0.0}); }},
+      {"velocities[2]: got nan",
+       [](auto& c) {
+         c.velocities({0.0, 0.0, kNaN, 0.0});
+       }},
+      {"velocities[0]: got 1e+300",
+       [](auto& c) {
+         c.velocities({1e300, 0.0, 0.0, 0.0});
+       }},
       {"duration: got nan", [](auto& c) { c.duration(kNaN); }},
       {"duration: got -1", [](auto& c) { c.duration(-1.0); }},
       {"duration: got 1e+18", [](auto& c) { c.duration(1e18); }}};

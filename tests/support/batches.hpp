@@ -25,7 +25,10 @@ inline physics_pool::RolloutBatch push_batch(const physics_pool::Scene& scene, s
   batch.world = physics_pool::scene_hash(scene);
   batch.x0 = physics_pool::initial_state(scene);
   const auto nu = static_cast<std::size_t>(physics_pool::layout_of(scene).nu);
-  const auto axes = [nu](std::vector<double> values) { values.resize(nu); return values; };  // a pusher has two
+  const auto axes = [nu](std::vector<double> values) {
+    values.resize(nu);
+    return values;
+  };  // a pusher has two
   batch.nominal.nu = static_cast<int>(nu);
   for (int t = 0; t < 3; ++t) batch.nominal.append(axes({0.1, 0.0, 0.0, 0.0}));
   batch.u_before.assign(nu, 0.0);
@@ -45,8 +48,8 @@ inline physics_pool::RolloutBatch wait_batch(const physics_pool::Scene& scene, s
 
 /// The bits of an outcome that must not depend on who ran it.
 inline Hash fingerprint(const physics_pool::RolloutOutcome& outcome) {
-  std::vector<double> all{static_cast<double>(outcome.sample), static_cast<double>(outcome.end),
-                          outcome.cost, static_cast<double>(outcome.at_goal)};
+  std::vector<double> all{static_cast<double>(outcome.sample), static_cast<double>(outcome.end), outcome.cost,
+                          static_cast<double>(outcome.at_goal)};
   all.insert(all.end(), outcome.step_costs.begin(), outcome.step_costs.end());
   for (const State& x : outcome.trajectory) {
     all.insert(all.end(), x.q.begin(), x.q.end());

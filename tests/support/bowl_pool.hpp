@@ -21,8 +21,8 @@ class BowlPool final : public physics_pool::Pool {
 
   Result<Hash> load(const physics_pool::Scene& scene) override { return scene_hash(scene); }
 
-  Result<physics_pool::BatchReply> run(const physics_pool::RolloutBatch& batch,
-                                       physics_pool::TimePoint deadline, std::stop_token stop = {}) override {
+  Result<physics_pool::BatchReply> run(const physics_pool::RolloutBatch& batch, physics_pool::TimePoint deadline,
+                                       std::stop_token stop = {}) override {
     batches.push_back(batch);
     deadlines.push_back(deadline);
     if (stop.stop_requested()) return Error{Code::kCancelled, "bowl: cancelled"};
@@ -57,9 +57,9 @@ class BowlPool final : public physics_pool::Pool {
   }
 
   double scale = 1000.0;
-  bool can_succeed = false;               ///< success where the total is at most the objective's
-  std::optional<int> success_steps;       ///< after which a success ends; else all
-  std::optional<std::size_t> fail_at;     ///< batches that go well before errors begin
+  bool can_succeed = false;            ///< success where the total is at most the objective's
+  std::optional<int> success_steps;    ///< after which a success ends; else all
+  std::optional<std::size_t> fail_at;  ///< batches that go well before errors begin
   Code fail_code = Code::kUnavailable;
   std::function<bool(const physics_pool::RolloutBatch&, std::uint32_t)> diverges;
   std::function<double(const physics_pool::RolloutBatch&)> extra;  ///< cost on top, in the last step

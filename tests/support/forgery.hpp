@@ -64,7 +64,8 @@ inline std::string subject_of(const std::filesystem::path& identity) {
 inline security::Grant full_grant(const std::string& subject) {
   constexpr std::time_t kDay = 86'400;
   const std::time_t now = std::time(nullptr);
-  return {.subject = subject, .validity = {now - 2 * kDay, now + 30 * kDay},
+  return {.subject = subject,
+          .validity = {now - 2 * kDay, now + 30 * kDay},
           .rights = security::rights_of(security::Role::kRobot)};
 }
 

@@ -103,8 +103,8 @@ class ProgramProcess {
     posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, out_.c_str(), O_WRONLY | O_CREAT, 0644);
     posix_spawn_file_actions_addopen(&files, STDERR_FILENO, err_.c_str(), O_WRONLY | O_CREAT, 0644);
-    const int problem = posix_spawn(&pid_, program.c_str(), &files, nullptr, pointers(arguments).data(),
-                                    pointers(variables).data());
+    const int problem =
+        posix_spawn(&pid_, program.c_str(), &files, nullptr, pointers(arguments).data(), pointers(variables).data());
     posix_spawn_file_actions_destroy(&files);
     if (problem != 0) throw std::runtime_error("cannot start " + program.string());
   }
@@ -179,8 +179,7 @@ class ProgramProcess {
   }
 
  private:
-  static std::filesystem::path output_file(const TempFolder& folder, const std::string& name,
-                                           const char* kind) {
+  static std::filesystem::path output_file(const TempFolder& folder, const std::string& name, const char* kind) {
     static int count = 0;
     return folder.path() / (name + "-" + std::to_string(count++) + "." + kind);
   }

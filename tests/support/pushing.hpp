@@ -25,13 +25,8 @@ inline physics_pool::SceneObject slider_disc(std::string name, double x, double 
 }
 
 inline physics_pool::SceneObject slider_box(std::string name, double x, double y, double yaw = 0.0) {
-  return {.name = std::move(name),
-          .size = {0.109, 0.154, 0.011},
-          .mass = 0.5,
-          .friction = 0.8,
-          .x = x,
-          .y = y,
-          .yaw = yaw};
+  return {
+      .name = std::move(name), .size = {0.109, 0.154, 0.011}, .mass = 0.5, .friction = 0.8, .x = x, .y = y, .yaw = yaw};
 }
 
 /// A pusher at (x, y) on a large table; the first slider is the target.
@@ -48,8 +43,9 @@ inline physics_pool::Scene pushing_scene(double x, double y, std::vector<physics
 
 /// A pusher in front of four discs that will push each other.
 inline physics_pool::Scene four_sliders() {
-  return pushing_scene(-0.075, 0.01, {slider_disc("s0", 0.0, 0.0), slider_disc("s1", 0.11, 0.04),
-                                      slider_disc("s2", 0.12, -0.08), slider_disc("s3", 0.22, 0.01)});
+  return pushing_scene(-0.075, 0.01,
+                       {slider_disc("s0", 0.0, 0.0), slider_disc("s1", 0.11, 0.04), slider_disc("s2", 0.12, -0.08),
+                        slider_disc("s3", 0.22, 0.01)});
 }
 
 /// The same control `steps` times, `samples` times over with noise `sigma`, m/s.

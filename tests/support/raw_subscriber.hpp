@@ -15,8 +15,8 @@ namespace jostle::tests {
 /// Of a topic as ROS 2 names it.
 class RawSubscriber {
  public:
-  RawSubscriber(const dds::Participant& participant, const std::string& topic, const std::string& type = "std_msgs/msg/String",
-                const dds::Qos& qos = {.depth = dds::kKeepAll})
+  RawSubscriber(const dds::Participant& participant, const std::string& topic,
+                const std::string& type = "std_msgs/msg/String", const dds::Qos& qos = {.depth = dds::kKeepAll})
       : reader_(participant, {dds::wire_topic(topic), dds::wire_type(type).value(), qos},
                 [this](std::span<const std::byte> sample, const dds::Origin&) {
                   const std::lock_guard lock(mutex_);

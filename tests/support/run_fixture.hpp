@@ -26,8 +26,9 @@ class RunFixture : public ::testing::Test {
   RunFixture() {
     easy = folder.write("easy.yaml", physics_pool::to_yaml(three_objects()));
     plain = folder.write("plain.yaml", "control: {many_iterations: 10}\n");
-    endless = folder.write("endless.yaml", "objective: {success_cost: 1.0e-9}\n"
-                                           "control: {many_iterations: 100000}\n");
+    endless = folder.write("endless.yaml",
+                           "objective: {success_cost: 1.0e-9}\n"
+                           "control: {many_iterations: 100000}\n");
   }
 
   /// Never the same twice in a test: start it, then look at `run`.
@@ -36,17 +37,14 @@ class RunFixture : public ::testing::Test {
     return *(run = program("jostle_run", arguments));
   }
 
-  std::unique_ptr<ProgramProcess> program(const std::string& name,
-                                          const std::vector<std::string>& arguments) {
+  std::unique_ptr<ProgramProcess> program(const std::string& name, const std::vector<std::string>& arguments) {
     return std::make_unique<ProgramProcess>(
         name, arguments, folder,
         ProgramProcess::Environment{{"ROS_DOMAIN_ID", std::to_string(domain)}, {"TMPDIR", folder.path()}});
   }
 
   /// Runs to its end and gives the exit code, -1 if it takes too long.
-  int finish(std::vector<std::string> arguments) {
-    return start(std::move(arguments)).wait(kPatience).value_or(-1);
-  }
+  int finish(std::vector<std::string> arguments) { return start(std::move(arguments)).wait(kPatience).value_or(-1); }
 
   /// A run that plans until it is told to end, its first rollouts done.
   void start_planning(std::vector<std::string> more = {}) {

@@ -65,7 +65,8 @@ class TerminalProcess {
   TerminalProcess& operator=(const TerminalProcess&) = delete;
 
   void type(const std::string& keys) const {
-    if (write(master_, keys.data(), keys.size()) != static_cast<ssize_t>(keys.size())) throw std::runtime_error("cannot type");
+    if (write(master_, keys.data(), keys.size()) != static_cast<ssize_t>(keys.size()))
+      throw std::runtime_error("cannot type");
   }
   void signal(int number) const { kill(pid_, number); }
 
@@ -97,7 +98,8 @@ class TerminalProcess {
     soon(patience, [&] {
       screen();  // it would not end while nobody reads
       int status = 0;
-      if (!code_ && waitpid(pid_, &status, WNOHANG) == pid_) code_ = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+      if (!code_ && waitpid(pid_, &status, WNOHANG) == pid_)
+        code_ = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
       return code_.has_value();
     });
     return code_;

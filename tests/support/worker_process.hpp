@@ -47,7 +47,7 @@ inline bool eventually(Clock::time_point deadline, const std::function<bool()>& 
 class WorkerProcess {
  public:
   explicit WorkerProcess(int domain, int threads = 1) {
-    std::vector<std::string> words{JOSTLE_WORKER, "--domain",  std::to_string(domain), "--threads",
+    std::vector<std::string> words{JOSTLE_WORKER,           "--domain",          std::to_string(domain),  "--threads",
                                    std::to_string(threads), "--die-with-parent", std::to_string(getpid())};
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());

@@ -82,7 +82,8 @@ void Forward::run_columns(std::span<const float> inputs, std::span<float> output
   }
   for (int c = 0; c < count; ++c) {
     for (int j = 0; j < kOutputs; ++j) {
-      outputs[static_cast<std::size_t>(c * kOutputs + j)] = x[j * kWide + c] * output_scale_[static_cast<std::size_t>(j)];
+      outputs[static_cast<std::size_t>(c * kOutputs + j)] =
+          x[j * kWide + c] * output_scale_[static_cast<std::size_t>(j)];
     }
   }
 }

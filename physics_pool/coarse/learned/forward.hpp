@@ -20,8 +20,8 @@ class Forward {
   void run(std::span<const float> inputs, std::span<float> outputs);
 
  private:
-  static constexpr int kPanel = 8;   // rows of weights that lie together
-  static constexpr int kColumns = 4; // answers worked out side by side
+  static constexpr int kPanel = 8;    // rows of weights that lie together
+  static constexpr int kColumns = 4;  // answers worked out side by side
 
   struct Layer {
     int inputs = 0, outputs = 0, panels = 0;

@@ -19,8 +19,12 @@ constexpr int kMaxParts = 1000;  // of a step; beyond it nothing is predicted
 class LearnedModel final : public CoarseModel {
  public:
   LearnedModel(const Network& network, int sliders)
-      : bodies_(network.bodies), parking_(network.parking), duration_(network.duration),
-        longest_way_(network.longest_way), layout_{sliders}, forward_(network) {
+      : bodies_(network.bodies),
+        parking_(network.parking),
+        duration_(network.duration),
+        longest_way_(network.longest_way),
+        layout_{sliders},
+        forward_(network) {
     views_.reserve(kMaxBatch);
     inputs_.resize(static_cast<std::size_t>(kMaxBatch) * kInputs);
     outputs_.resize(static_cast<std::size_t>(kMaxBatch + 1) * kOutputs);
@@ -57,8 +61,9 @@ class LearnedModel final : public CoarseModel {
     for (std::size_t k = 0; k < controls.size() / 2; ++k) {
       if (part >= parts_[k]) continue;
       const double pace = duration / (parts_[k] * duration_);
-      const PushView& view = views_.emplace_back(bodies_, state_of(states, k), layout_.sliders,
-                                                 std::array{controls[2 * k] * pace, controls[2 * k + 1] * pace}, duration_);
+      const PushView& view =
+          views_.emplace_back(bodies_, state_of(states, k), layout_.sliders,
+                              std::array{controls[2 * k] * pace, controls[2 * k + 1] * pace}, duration_);
       if (view.slots() > 0) view.inputs(parking_, std::span(inputs_).subspan(kInputs * asked++, kInputs));
     }
     forward_.run(std::span(inputs_).first(asked * kInputs), std::span(outputs_).first(asked * kOutputs));
@@ -81,7 +86,7 @@ class LearnedModel final : public CoarseModel {
   const double duration_, longest_way_;
   const PlanarLayout layout_;
   Forward forward_;
-  std::vector<PushView> views_;         // [kMaxBatch]
+  std::vector<PushView> views_;          // [kMaxBatch]
   std::array<int, kMaxBatch> parts_{};   // that a state's step is taken in
   std::vector<float> inputs_, outputs_;  // [kMaxBatch] of the views that meet something
 };
@@ -116,7 +121,8 @@ Result<std::unique_ptr<CoarseModel>> make_learned_model(const Network& network, 
   if (const auto why = objection(network, scene)) {
     return Error{Code::kInvalidArgument,
                  fmt::format("{}: does not fit scene '{}': {}; choose another coarse model, or train one "
-                             "with jostle train-coarse", origin, scene.name, *why)};
+                             "with jostle train-coarse",
+                             origin, scene.name, *why)};
   }
   return std::unique_ptr<CoarseModel>(new LearnedModel(network, static_cast<int>(scene.objects.size())));
 }

@@ -60,7 +60,8 @@ class Parser {
       const auto [end, problem] = std::from_chars(line.data(), line.data() + line.size(), value);
       const bool ends = end == line.data() + line.size() || *end == ' ';
       if (problem != std::errc{} || !ends || !(value >= low && value <= high)) {
-        return wrong(key, fmt::format("got '{}', wanted a number in [{}, {}]", line.substr(0, line.find(' ')), low, high));
+        return wrong(key,
+                     fmt::format("got '{}', wanted a number in [{}, {}]", line.substr(0, line.find(' ')), low, high));
       }
       values.push_back(value);
       line.remove_prefix(static_cast<std::size_t>(end - line.data()));
@@ -89,12 +90,14 @@ class Parser {
   std::optional<Error> binary(std::string_view what, std::size_t count, std::vector<float>& values) {
     values.resize(count);
     if (rest_.size() < count * sizeof(float)) {
-      return wrong(what, fmt::format("the file is cut off: got {} bytes, wanted {}", rest_.size(), count * sizeof(float)));
+      return wrong(what,
+                   fmt::format("the file is cut off: got {} bytes, wanted {}", rest_.size(), count * sizeof(float)));
     }
     std::memcpy(values.data(), rest_.data(), count * sizeof(float));
     rest_.remove_prefix(count * sizeof(float));
     for (std::size_t i = 0; i < count; ++i) {
-      if (!std::isfinite(values[i])) return wrong(what, fmt::format("value {}: got {}, wanted a finite number", i, values[i]));
+      if (!std::isfinite(values[i]))
+        return wrong(what, fmt::format("value {}: got {}, wanted a finite number", i, values[i]));
     }
     return {};
   }
@@ -149,7 +152,8 @@ std::optional<Error> check_widths(const Parser& parser, const std::vector<double
     return parser.wrong("layers", fmt::format("got {} widths, wanted 2 to {}", widths.size(), kMaxLayers + 1));
   }
   for (const double width : widths) {
-    if (width != std::floor(width)) return parser.wrong("layers", fmt::format("got {} neurons, wanted a whole number", width));
+    if (width != std::floor(width))
+      return parser.wrong("layers", fmt::format("got {} neurons, wanted a whole number", width));
   }
   if (widths.front() != kInputs || widths.back() != kOutputs) {
     return parser.wrong("layers", fmt::format("got {} inputs and {} outputs, wanted {} and {}", widths.front(),
@@ -169,7 +173,8 @@ Result<Network> parse_network(std::string_view content, const std::string& origi
   for (std::size_t i = 0; i + 1 < widths.size(); ++i) {
     NetworkLayer layer{.inputs = static_cast<int>(widths[i]), .outputs = static_cast<int>(widths[i + 1])};
     const auto inputs = static_cast<std::size_t>(layer.inputs), outputs = static_cast<std::size_t>(layer.outputs);
-    if (auto error = parser.binary(fmt::format("weights of layer {}", i + 1), inputs * outputs, layer.weights)) return *error;
+    if (auto error = parser.binary(fmt::format("weights of layer {}", i + 1), inputs * outputs, layer.weights))
+      return *error;
     if (auto error = parser.binary(fmt::format("biases of layer {}", i + 1), outputs, layer.biases)) return *error;
     network.layers.push_back(std::move(layer));
   }
@@ -179,7 +184,9 @@ Result<Network> parse_network(std::string_view content, const std::string& origi
 
 Result<Network> load_network(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary | std::ios::ate);
-  const auto refused = [&](const std::string& why) { return Error{Code::kIo, fmt::format("{}: {}", file.string(), why)}; };
+  const auto refused = [&](const std::string& why) {
+    return Error{Code::kIo, fmt::format("{}: {}", file.string(), why)};
+  };
   if (!in) return refused("cannot be opened; jostle train-coarse fit writes such a file");
   const auto bytes = in.tellg();
   if (bytes < 0) return refused("cannot be read");

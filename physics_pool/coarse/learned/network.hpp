@@ -22,13 +22,13 @@ struct NetworkLayer {
 ///
 ///   z_i = (input_i - input_mean_i) / input_scale_i,   output_j = y_j · output_scale_j
 struct Network {
-  PushBodies bodies;             ///< it was trained with
-  double slider_height = 0.0;    ///< m
-  double slider_mass = 0.0;      ///< kg
-  double duration = 1.0;         ///< Delta_t, s
-  double longest_way = 0.0;      ///< of the pusher in one step, m
-  std::uint64_t samples = 0;     ///< transitions it has seen
-  Parking parking = kParking;    ///< of unused sliders
+  PushBodies bodies;                           ///< it was trained with
+  double slider_height = 0.0;                  ///< m
+  double slider_mass = 0.0;                    ///< kg
+  double duration = 1.0;                       ///< Delta_t, s
+  double longest_way = 0.0;                    ///< of the pusher in one step, m
+  std::uint64_t samples = 0;                   ///< transitions it has seen
+  Parking parking = kParking;                  ///< of unused sliders
   std::vector<float> input_mean, input_scale;  ///< [kInputs]
   std::vector<float> output_scale;             ///< [kOutputs]
   std::vector<NetworkLayer> layers;            ///< first takes kInputs, last gives kOutputs

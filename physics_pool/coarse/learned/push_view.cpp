@@ -8,10 +8,10 @@
 namespace jostle::physics_pool {
 namespace {
 
-constexpr double kGravity = 9.81;     // m/s^2
-constexpr double kStill = 1e-6;       // m; a shorter way moves nothing
-constexpr double kFastest = 1.5;      // shares of the pusher's speed that a slider may get
-constexpr double kTouch = 0.002;      // m; closer than this counts as touched, about the network's error
+constexpr double kGravity = 9.81;  // m/s^2
+constexpr double kStill = 1e-6;    // m; a shorter way moves nothing
+constexpr double kFastest = 1.5;   // shares of the pusher's speed that a slider may get
+constexpr double kTouch = 0.002;   // m; closer than this counts as touched, about the network's error
 
 // Between a point and the segment from a to b.
 double segment_distance(double x, double y, double ax, double ay, double bx, double by) {
@@ -27,8 +27,8 @@ double segment_distance(double x, double y, double ax, double ay, double bx, dou
 // network knows better.
 std::array<double, 2> escape(double nx, double ny, double hint_x, double hint_y) {
   constexpr double kQuarter = std::numbers::pi / 4;
-  constexpr double kBlur = 0.07;   // rad from an axis at which the way is half a diagonal's
-  constexpr double kCone = 0.35;   // rad from an axis within which contact friction matters
+  constexpr double kBlur = 0.07;  // rad from an axis at which the way is half a diagonal's
+  constexpr double kCone = 0.35;  // rad from an axis within which contact friction matters
   const double normal = std::atan2(ny, nx);
   const double axis = 2 * kQuarter * std::round(normal / (2 * kQuarter)), off = normal - axis;
   const double hint = std::remainder(std::atan2(hint_y, hint_x) - axis, 2 * std::numbers::pi);
@@ -198,7 +198,8 @@ void PushView::guess_ways() {
 
 void PushView::inputs(const Parking& parking, std::span<float> values) const {
   float* value = values.data();
-  for (const double v : {way_, way_ * cos_, way_ * sin_, std::atan2(sin_, cos_), speed_}) *value++ = static_cast<float>(v);
+  for (const double v : {way_, way_ * cos_, way_ * sin_, std::atan2(sin_, cos_), speed_})
+    *value++ = static_cast<float>(v);
   for (int slot = 0; slot < kSlots; ++slot) {
     if (slot >= slots_) {
       const auto [x, y] = parking[at(slot)];
@@ -206,8 +207,8 @@ void PushView::inputs(const Parking& parking, std::span<float> values) const {
       continue;
     }
     const double x = x_[at(slot)], y = y_[at(slot)];
-    for (const double v : {x, y, cos_ * x + sin_ * y, cos_ * y - sin_ * x, vx_[at(slot)], vy_[at(slot)], omega_[at(slot)],
-                           guess_x_[at(slot)], guess_y_[at(slot)]}) {
+    for (const double v : {x, y, cos_ * x + sin_ * y, cos_ * y - sin_ * x, vx_[at(slot)], vy_[at(slot)],
+                           omega_[at(slot)], guess_x_[at(slot)], guess_y_[at(slot)]}) {
       *value++ = static_cast<float>(v);
     }
   }
@@ -223,7 +224,9 @@ void PushView::targets(std::span<const double> before, std::span<const double> a
     const auto step = fold(pose[0] - old_pose[0], pose[1] - old_pose[1]);
     const auto v = fold(velocity[0], velocity[1]);
     // Faster than the pusher is who moved before: of no use for a push.
-    const auto share = [&](double speed) { return static_cast<float>(std::clamp(speed / speed_, -kFastest, kFastest)); };
+    const auto share = [&](double speed) {
+      return static_cast<float>(std::clamp(speed / speed_, -kFastest, kFastest));
+    };
     float* value = values.data() + slot * kSlotOutputs;
     value[0] = static_cast<float>(step[0] - guess_x_[at(slot)]);
     value[1] = static_cast<float>(step[1] - guess_y_[at(slot)]);
@@ -238,8 +241,8 @@ void PushView::touched(std::span<const float> outputs, std::array<bool, kSlots>&
   const auto end = pusher_end();
   is_touched = {};
   for (int slot = 0; slot < slots_; ++slot) {
-    is_touched[at(slot)] = segment_distance(x_[at(slot)], y_[at(slot)], 0, 0, end[0], end[1]) <
-                           bodies_.pusher_reach() + kTouch;
+    is_touched[at(slot)] =
+        segment_distance(x_[at(slot)], y_[at(slot)], 0, 0, end[0], end[1]) < bodies_.pusher_reach() + kTouch;
   }
   for (int round = 1; round < slots_; ++round) {
     for (int i = 0; i < slots_; ++i) {

@@ -10,10 +10,10 @@
 
 namespace jostle::physics_pool {
 
-inline constexpr int kSlots = 4;         ///< N_s, sliders at most
-inline constexpr int kPushInputs = 5;    ///< way ahead (3), heading, speed
-inline constexpr int kSlotInputs = 9;    ///< position in two frames (4), velocity (3), rough way (2)
-inline constexpr int kSlotOutputs = 6;   ///< change of pose, velocity
+inline constexpr int kSlots = 4;        ///< N_s, sliders at most
+inline constexpr int kPushInputs = 5;   ///< way ahead (3), heading, speed
+inline constexpr int kSlotInputs = 9;   ///< position in two frames (4), velocity (3), rough way (2)
+inline constexpr int kSlotOutputs = 6;  ///< change of pose, velocity
 inline constexpr int kInputs = kPushInputs + kSlots * kSlotInputs;
 inline constexpr int kOutputs = kSlots * kSlotOutputs;
 
@@ -87,11 +87,11 @@ class PushView {
   int sliders_ = 0;
   std::array<double, 2> u_{};
   double duration_ = 0.0, speed_ = 0.0;
-  bool swap_ = false;                    // x and y, after the signs
+  bool swap_ = false;  // x and y, after the signs
   double sign_x_ = 1.0, sign_y_ = 1.0;
-  double handedness_ = 1.0;              // -1: the fold is a reflection
-  double cos_ = 1.0, sin_ = 0.0;         // of the way in the fold
-  double way_ = 0.0;                     // m, left once a slider is touched
+  double handedness_ = 1.0;       // -1: the fold is a reflection
+  double cos_ = 1.0, sin_ = 0.0;  // of the way in the fold
+  double way_ = 0.0;              // m, left once a slider is touched
   // In fold's frame: of slider i until slots are filled, of slot i afterwards.
   std::array<double, kSlots> x_{}, y_{}, vx_{}, vy_{}, omega_{};
   std::array<double, kSlots> guess_x_{}, guess_y_{};  // of slots: rough ways, m

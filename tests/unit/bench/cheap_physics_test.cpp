@@ -60,9 +60,16 @@ TEST(CheapPhysics, ComparesEveryLeverWithFullPhysics) {
   shipped.rollouts = shipped.screening = 2;
   shipped.freeze = shipped.stop_hopeless = true;
   shipped.step_duration = 0.5;
-  CheapPhysicsOptions options{.levers = usual_levers(shipped), .sizes = {2}, .worlds = 1, .repeats = 1,
-                              .iterations = 1, .samples = 6, .executed_objects = 2, .executed_worlds = 2,
-                              .demo = {tests::target_only()}, .demo_seeds = 1};
+  CheapPhysicsOptions options{.levers = usual_levers(shipped),
+                              .sizes = {2},
+                              .worlds = 1,
+                              .repeats = 1,
+                              .iterations = 1,
+                              .samples = 6,
+                              .executed_objects = 2,
+                              .executed_worlds = 2,
+                              .demo = {tests::target_only()},
+                              .demo_seeds = 1};
   options.control.step_duration = 0.5;
   options.control.many_iterations = 2;
 

@@ -116,10 +116,12 @@ TEST_F(ConvergenceTest, TellsHowFarItIs) {
 
 TEST_F(ConvergenceTest, EndsWhenAsked) {
   std::stop_source stop;
-  const auto result = measure_convergence(pool, scenes, options,
-                                          [&stop](const Curve&, std::size_t n, std::size_t) {
-                                            if (n == 3) stop.request_stop();
-                                          }, stop.get_token());
+  const auto result = measure_convergence(
+      pool, scenes, options,
+      [&stop](const Curve&, std::size_t n, std::size_t) {
+        if (n == 3) stop.request_stop();
+      },
+      stop.get_token());
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, Code::kCancelled);
 }
@@ -138,11 +140,10 @@ Curve made_up(const std::string& method, std::vector<CurvePoint> points) {
 
 // Costs relative to the first, at rollouts 1, 10 and 100.
 TEST(ConvergenceSummary, QuartilesOfStaircasesOnACommonGrid) {
-  const std::vector<Curve> curves{
-      made_up("a", {{1, 0.1, 100}, {9, 0.2, 50}, {100, 0.3, 10}}),   // 1, 0.5, 0.1
-      made_up("a", {{1, 0.1, 10}, {11, 0.2, 4}, {90, 0.3, 2}}),      // 1, 1, 0.2: ended at 90
-      made_up("a", {{1, 0.1, 1}, {10, 0.2, 0.7}, {100, 0.3, 0.6}}),  // 1, 0.7, 0.6
-      made_up("b", {{1, 0.1, 2}, {10, 0.2, 1}})};
+  const std::vector<Curve> curves{made_up("a", {{1, 0.1, 100}, {9, 0.2, 50}, {100, 0.3, 10}}),  // 1, 0.5, 0.1
+                                  made_up("a", {{1, 0.1, 10}, {11, 0.2, 4}, {90, 0.3, 2}}),  // 1, 1, 0.2: ended at 90
+                                  made_up("a", {{1, 0.1, 1}, {10, 0.2, 0.7}, {100, 0.3, 0.6}}),  // 1, 0.7, 0.6
+                                  made_up("b", {{1, 0.1, 2}, {10, 0.2, 1}})};
   const std::vector<Summary> sut = summarize(curves, Spent::kRollouts, 3);
   ASSERT_EQ(sut.size(), 2u);
   EXPECT_EQ(sut[0].method, "a");
@@ -156,8 +157,7 @@ TEST(ConvergenceSummary, QuartilesOfStaircasesOnACommonGrid) {
 }
 
 TEST(ConvergenceSummary, SecondsBeginAtOneAndEndAtTheMedian) {
-  const std::vector<Curve> curves{made_up("a", {{1, 0.01, 8}, {2, 1.0, 4}}),
-                                  made_up("a", {{1, 0.04, 8}, {2, 4.0, 2}}),
+  const std::vector<Curve> curves{made_up("a", {{1, 0.01, 8}, {2, 1.0, 4}}), made_up("a", {{1, 0.04, 8}, {2, 4.0, 2}}),
                                   made_up("a", {{1, 0.02, 8}, {2, 2.0, 6}})};
   const Summary sut = summarize(curves, Spent::kSeconds, 5).at(0);
   EXPECT_EQ(sut.x.front(), 0.01);
@@ -179,8 +179,9 @@ TEST(ConvergenceJson, HasColumnsPerCurve) {
 
 TEST(ConvergencePlot, DrawsWhatWasMeasured) {
   const tests::TempFolder folder;
-  const auto drawn = plot_convergence({made_up("a", {{1, 0.1, 8}, {20, 0.9, 2}}), made_up("b", {{1, 0.1, 8}, {20, 1.9, 3}})},
-                                      folder.path() / "curves.png");
+  const auto drawn =
+      plot_convergence({made_up("a", {{1, 0.1, 8}, {20, 0.9, 2}}), made_up("b", {{1, 0.1, 8}, {20, 1.9, 3}})},
+                       folder.path() / "curves.png");
   ASSERT_TRUE(drawn) << drawn.error().message;
   EXPECT_GT(std::filesystem::file_size(folder.path() / "curves.png"), 10'000u);
 }

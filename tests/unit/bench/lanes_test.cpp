@@ -12,12 +12,18 @@ namespace {
 using ::testing::HasSubstr;
 
 LaneChart made_up(int lanes) {
-  LaneChart chart{.title = "Made-up bars, 100 % of 'it'", .x_label = "ms", .series = {"one", "two", "none of it"},
-                  .hatched = "copy, dropped", .length = 100.0};
+  LaneChart chart{.title = "Made-up bars, 100 % of 'it'",
+                  .x_label = "ms",
+                  .series = {"one", "two", "none of it"},
+                  .hatched = "copy, dropped",
+                  .length = 100.0};
   for (int lane = 0; lane < lanes; ++lane) {
     chart.lanes.push_back("worker-" + std::to_string(lane));
     for (int i = 0; i < 10; ++i) {
-      chart.bars.push_back({.lane = lane, .series = i % 2, .from = 10.0 * i + lane % 3, .to = 10.0 * i + 9.0,
+      chart.bars.push_back({.lane = lane,
+                            .series = i % 2,
+                            .from = 10.0 * i + lane % 3,
+                            .to = 10.0 * i + 9.0,
                             .hatched = i == lane % 10});
     }
   }

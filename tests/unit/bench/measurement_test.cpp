@@ -33,7 +33,10 @@ TEST(Compare, RunsBothSidesInTurnsAfterOneUncountedRun) {
 TEST(Compare, TakesTheMedianOfRatiosOfNeighbours) {
   std::vector<double> values{1.0, 9.0, 2.0};  // the last two are counted
   auto value = values.begin();
-  const auto result = compare({"a", [&]() -> Result<Sample> { return Sample{*value++, kHash}; }},
+  const auto result = compare({"a",
+                               [&]() -> Result<Sample> {
+                                 return Sample{*value++, kHash};
+                               }},
                               constant("b", 2.0), {.repeats = 2});
   ASSERT_TRUE(result);
   EXPECT_DOUBLE_EQ(result->ratio(), (9.0 / 2.0 + 2.0 / 2.0) / 2.0);
@@ -83,8 +86,8 @@ TEST(Compare, CountsTheCpuSecondsOfEachRun) {
       return Sample{1.0, kHash};
     };
   };
-  const auto result = compare({"a", spending(2.0)}, {"b", spending(3.0)},
-                              {.repeats = 1, .cpu_seconds = [&used] { return used; }});
+  const auto result =
+      compare({"a", spending(2.0)}, {"b", spending(3.0)}, {.repeats = 1, .cpu_seconds = [&used] { return used; }});
   ASSERT_TRUE(result);
   EXPECT_THAT(result->cpu_a, ElementsAre(2.0));
   EXPECT_THAT(result->cpu_b, ElementsAre(3.0));

@@ -100,9 +100,7 @@ TEST(Hash, OrdersByHighThenLow) {
   EXPECT_LT((Hash{.high = 1, .low = 1}), (Hash{.high = 1, .low = 2}));
 }
 
-ControlSequence three_steps() {
-  return {.nu = 2, .values = {1, 2, 3, 4, 5, 6}};
-}
+ControlSequence three_steps() { return {.nu = 2, .values = {1, 2, 3, 4, 5, 6}}; }
 
 TEST(ControlSequence, CountsSteps) {
   EXPECT_EQ(three_steps().steps(), 3);

@@ -109,8 +109,8 @@ TEST_F(AllocationTest, ScoringAStepAllocatesNothing) {
   const std::array<double, 4> u{0.1, 0, 0, 0}, none{};
   const Objective objective;
   const long before = allocations;
-  const double cost = running_cost(geometry, objective, none, u, a, b) +
-                      goal_cost(geometry, b, objective.angle) + at_goal(geometry, b, objective);
+  const double cost = running_cost(geometry, objective, none, u, a, b) + goal_cost(geometry, b, objective.angle) +
+                      at_goal(geometry, b, objective);
   EXPECT_EQ(allocations, before);
   EXPECT_GT(cost, 0.0);
 }

@@ -76,17 +76,24 @@ const std::vector<Case> kCases{
      "nominal.nu", "2", "4"},
     {"NoControls", [](B& b) { b.nominal.values.clear(); }, "nominal.values", "0 values", "at least one"},
     {"HalfAStep", [](B& b) { b.nominal.values.resize(6); }, "nominal.values", "6 values", "multiple of nu = 4"},
-    {"AbsurdHorizon", [](B& b) { b.nominal.values.resize(4 * (kMaxSteps + 1)); }, "nominal.values", "10001 steps", "10000"},
+    {"AbsurdHorizon", [](B& b) { b.nominal.values.resize(4 * (kMaxSteps + 1)); }, "nominal.values", "10001 steps",
+     "10000"},
     {"NaNControl", [](B& b) { b.nominal.values[5] = kNaN; }, "nominal.values[5]", "nan", "finite"},
     {"InfiniteControl", [](B& b) { b.nominal.values[0] = kInfinity; }, "nominal.values[0]", "inf", "finite"},
     {"NoSamples", [](B& b) { b.samples = 0; }, "samples", "0", "1 to"},
     {"ManySamples", [](B& b) { b.samples = kMaxSamples + 1; }, "samples", "1000001", "1000000"},
-    {"SamplesThatWrap", [](B& b) { b.first_sample = UINT32_MAX; b.samples = 2; }, "first_sample", "4294967295", "no wrap"},
+    {"SamplesThatWrap",
+     [](B& b) {
+       b.first_sample = UINT32_MAX;
+       b.samples = 2;
+     },
+     "first_sample", "4294967295", "no wrap"},
     {"ZeroDuration", [](B& b) { b.step_duration = 0; }, "step_duration", "0 s", "more than 0"},
     {"NegativeDuration", [](B& b) { b.step_duration = -1; }, "step_duration", "-1 s", "more than 0"},
     {"NaNDuration", [](B& b) { b.step_duration = kNaN; }, "step_duration", "nan s", "more than 0"},
     {"LongDuration", [](B& b) { b.step_duration = 61; }, "step_duration", "61 s", "60 s"},
-    {"OddDuration", [](B& b) { b.step_duration = 0.1234567; }, "step_duration", "0.1234567 s", "multiple of the time step, 0.002 s"},
+    {"OddDuration", [](B& b) { b.step_duration = 0.1234567; }, "step_duration", "0.1234567 s",
+     "multiple of the time step, 0.002 s"},
     {"TinyDuration", [](B& b) { b.step_duration = 1e-9; }, "step_duration", "1e-09 s", "multiple"},
     {"HugeState", [](B& b) { b.x0.q.resize(kMaxStateSize + 1); }, "x0", "100001", "100000"},
     {"ShortQ", [](B& b) { b.x0.q.resize(11); }, "x0.q", "11 values", "12"},
@@ -109,7 +116,8 @@ const std::vector<Case> kCases{
     {"NaNAngle", [](B& b) { b.objective.angle = kNaN; }, "objective.angle", "nan", ">= 0"},
     {"NegativeAcceleration", [](B& b) { b.objective.acceleration = -1; }, "objective.acceleration", "-1", ">= 0"},
     {"NegativeDisturbance", [](B& b) { b.objective.disturbance = -1; }, "objective.disturbance", "-1", ">= 0"},
-    {"NegativeRotation", [](B& b) { b.objective.disturbance_rotation = -1; }, "objective.disturbance_rotation", "-1", ">= 0"},
+    {"NegativeRotation", [](B& b) { b.objective.disturbance_rotation = -1; }, "objective.disturbance_rotation", "-1",
+     ">= 0"},
     {"InfiniteEdge", [](B& b) { b.objective.edge = kInfinity; }, "objective.edge", "inf", ">= 0"},
     {"NegativeEdgeRate", [](B& b) { b.objective.edge_rate = -1; }, "objective.edge_rate", "-1", ">= 0"},
     {"NaNExponent", [](B& b) { b.objective.edge_exponent_max = kNaN; }, "objective.edge_exponent_max", "nan", ">= 0"},
@@ -122,19 +130,36 @@ const std::vector<Case> kCases{
     {"NegativePersistence", [](B& b) { b.law.persistence = -0.1; }, "law.persistence", "-0.1", "at least 0"},
     {"PersistenceOfOne", [](B& b) { b.law.persistence = 1; }, "law.persistence", "1", "less than 1"},
     {"NaNPersistence", [](B& b) { b.law.persistence = kNaN; }, "law.persistence", "nan", "less than 1"},
-    {"DrawsOfTooFewSamples", [](B& b) { b.law.draws = {1}; b.samples = 2; }, "law.draws", "1 values", "2 samples"},
+    {"DrawsOfTooFewSamples",
+     [](B& b) {
+       b.law.draws = {1};
+       b.samples = 2;
+     },
+     "law.draws", "1 values", "2 samples"},
     {"NegativeTimeStep", [](B& b) { b.fidelity.time_step = -0.1; }, "fidelity.time_step", "-0.1", "at most 0.02"},
     {"NaNTimeStep", [](B& b) { b.fidelity.time_step = kNaN; }, "fidelity.time_step", "nan", "at most 0.02"},
     {"LongTimeStep", [](B& b) { b.fidelity.time_step = 0.05; }, "fidelity.time_step", "0.05", "at most 0.02"},
-    {"OddTimeStep", [](B& b) { b.fidelity.time_step = 0.003; b.step_duration = 0.5; }, "step_duration", "0.5 s", "0.003 s"},
+    {"OddTimeStep",
+     [](B& b) {
+       b.fidelity.time_step = 0.003;
+       b.step_duration = 0.5;
+     },
+     "step_duration", "0.5 s", "0.003 s"},
     {"NoScales", [](B& b) { b.law.scales.clear(); }, "law.scales", "0 values", "1 to"},
-    {"NaNScale", [](B& b) { b.law.scales = {1, kNaN}; }, "law.scales[1]", "nan", ">= 0"},
+    {"NaNScale",
+     [](B& b) {
+       b.law.scales = {1, kNaN};
+     },
+     "law.scales[1]", "nan", ">= 0"},
     {"InfiniteSigma", [](B& b) { b.law.sigma[0] = HUGE_VAL; }, "law.sigma[0]", "inf", ">= 0"},
     {"NegativeObstruction", [](B& b) { b.objective.obstruction = -1; }, "objective.obstruction", "-1", ">= 0"},
-    {"NegativeObstacleTarget", [](B& b) { b.objective.obstacle_target = -1; }, "objective.obstacle_target", "-1", ">= 0"},
+    {"NegativeObstacleTarget", [](B& b) { b.objective.obstacle_target = -1; }, "objective.obstacle_target", "-1",
+     ">= 0"},
     {"NaNObstaclePusher", [](B& b) { b.objective.obstacle_pusher = kNaN; }, "objective.obstacle_pusher", "nan", ">= 0"},
-    {"NoObstacleCap", [](B& b) { b.objective.obstacle_nearest = 0; }, "objective.obstacle_nearest", "0 m", ">= 0.001 m"},
-    {"NaNObstacleCap", [](B& b) { b.objective.obstacle_nearest = kNaN; }, "objective.obstacle_nearest", "nan", ">= 0.001 m"},
+    {"NoObstacleCap", [](B& b) { b.objective.obstacle_nearest = 0; }, "objective.obstacle_nearest", "0 m",
+     ">= 0.001 m"},
+    {"NaNObstacleCap", [](B& b) { b.objective.obstacle_nearest = kNaN; }, "objective.obstacle_nearest", "nan",
+     ">= 0.001 m"},
     {"NegativeCollision", [](B& b) { b.objective.collision = -1; }, "objective.collision", "-1", ">= 0"},
     {"NegativeIntrusion", [](B& b) { b.objective.intrusion = -1; }, "objective.intrusion", "-1", ">= 0"},
     {"NaNSuccess", [](B& b) { b.objective.success_cost = kNaN; }, "objective.success_cost", "nan", ">= 0"},
@@ -188,7 +213,8 @@ TEST(SelectWinner, TakesNobodyWhenTheIncumbentIsAsGood) {
 }
 
 TEST(SelectWinner, TakesTheFirstSuccessWhateverItCosts) {
-  const auto list = outcomes({{End::kCompleted, 1}, {End::kLost, kInfinity}, {End::kSucceeded, 9}, {End::kSucceeded, 2}});
+  const auto list =
+      outcomes({{End::kCompleted, 1}, {End::kLost, kInfinity}, {End::kSucceeded, 9}, {End::kSucceeded, 2}});
   EXPECT_EQ(select_winner(list, kInfinity), 2);
   EXPECT_EQ(select_winner(list, 0.5), 2);
 }

@@ -61,7 +61,8 @@ TEST_F(OutlookTest, WhatHasDroppedIsPaidForInEveryStepToCome) {
 TEST(OutlookOfRollouts, IsNeverTooHigh) {
   int judged = 0, hopeless = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const WorldPtr world = std::move(World::compile(std::move(generate_chapter3({.objects = 8, .seed = seed})).value())).value();
+    const WorldPtr world =
+        std::move(World::compile(std::move(generate_chapter3({.objects = 8, .seed = seed})).value())).value();
     const TaskGeometry& geometry = world->geometry();
     Simulator simulator(world);
     RolloutBatch batch;
@@ -69,8 +70,10 @@ TEST(OutlookOfRollouts, IsNeverTooHigh) {
     const double speed = seed % 2 == 0 ? 0.07 : 0.025;  // some arrive, some cannot
     for (int t = 0; t < 4; ++t) batch.nominal.append(std::vector{speed, 0.0, 0.0, 0.0});
     batch.u_before = kNone;
-    batch.law = {.sigma = {0.04, 0.04, 0.25, 0.004}, .limit = {0.15, 0.15, 0.8, 0.05},
-                 .scales = {0.125, 0.25, 0.5, 1.0}, .seed = seed};
+    batch.law = {.sigma = {0.04, 0.04, 0.25, 0.004},
+                 .limit = {0.15, 0.15, 0.8, 0.05},
+                 .scales = {0.125, 0.25, 0.5, 1.0},
+                 .seed = seed};
     batch.stop_losers = false;
     batch.want_all_trajectories = true;
     for (std::uint32_t sample = 0; sample < 8; ++sample) {
@@ -81,7 +84,8 @@ TEST(OutlookOfRollouts, IsNeverTooHigh) {
       double paid = 0.0;
       for (int done = 0; done < controls.steps(); ++done) {
         const auto at = static_cast<std::size_t>(done);
-        const auto before = done == 0 ? std::span<const double>(batch.u_before) : std::as_const(controls).step(done - 1);
+        const auto before =
+            done == 0 ? std::span<const double>(batch.u_before) : std::as_const(controls).step(done - 1);
         const Outlook sut = outlook(geometry, batch.objective, controls, done, before, outcome.trajectory[at], 1.0);
         EXPECT_LE(paid + sut.cost, outcome.cost * (1 + 1e-12)) << "seed " << seed << " sample " << sample;
         for (std::size_t t = at + 1; t < outcome.trajectory.size() && !sut.may_succeed; ++t) {

@@ -32,7 +32,7 @@ std::vector<double> advance(CoarseModel& sut, std::vector<double> planar, std::v
 TEST(ToPlanar, NamesEveryPart) {
   Scene scene = pushing_scene(-0.3, 0.1, {slider_box("a", 0.1, 0.2, 0.7), slider_disc("b", 0.4, -0.3)});
   State x = initial_state(scene);
-  x.v[0] = 1;  // pusher
+  x.v[0] = 1;      // pusher
   x.v[2 + 1] = 2;  // of a: y
   x.v[2 + 5] = 3;  // of a: about z
   std::vector<double> planar(PlanarLayout{2}.size());
@@ -76,7 +76,8 @@ TEST(Kinematic, MissedAndReceding) {
 
   for (const auto& u : {std::vector{0.0, 0.1}, std::vector{-0.1, 0.0}, std::vector{0.0, 0.0}}) {
     const auto x = advance(sut, start, u, 1.0);
-    EXPECT_EQ(std::vector<double>(x.begin() + 2, x.begin() + 5), std::vector<double>(start.begin() + 2, start.begin() + 5));
+    EXPECT_EQ(std::vector<double>(x.begin() + 2, x.begin() + 5),
+              std::vector<double>(start.begin() + 2, start.begin() + 5));
     EXPECT_DOUBLE_EQ(x[0], start[0] + u[0]);
   }
 }
@@ -133,8 +134,9 @@ TEST_P(QuasiStatic, NothingEndsInsideThePusher) {
     QuasiStaticModel sut = model(scene);
     auto x = planar_start(scene);
     for (int step = 0; step < 4; ++step) x = advance(sut, x, {0.06, 0.01}, 1.0);
-    const Contacts contacts = find_contacts(outline(scene.objects[0]), PlanarPose(x[2], x[3], x[4]),
-                                            {.radius = kPusher}, PlanarPose(x[0], x[1], 0.0), 5e-5);  // second order in the substep
+    const Contacts contacts =
+        find_contacts(outline(scene.objects[0]), PlanarPose(x[2], x[3], x[4]), {.radius = kPusher},
+                      PlanarPose(x[0], x[1], 0.0), 5e-5);  // second order in the substep
     EXPECT_TRUE(contacts.empty());
   }
 }
@@ -151,16 +153,19 @@ INSTANTIATE_TEST_SUITE_P(Models, QuasiStatic, ::testing::Bool(),
 
 TEST(Planar, RowOfDiscsMovesTogether) {
   const double d = 2 * kDisc;
-  const Scene scene = pushing_scene(-kDisc - kPusher, 0.0, {slider_disc("a", 0, 0), slider_disc("b", d, 0), slider_disc("c", 2 * d, 0)});
+  const Scene scene = pushing_scene(-kDisc - kPusher, 0.0,
+                                    {slider_disc("a", 0, 0), slider_disc("b", d, 0), slider_disc("c", 2 * d, 0)});
   QuasiStaticModel sut(scene, {.sweeps = 30});
 
   const auto x = advance(sut, planar_start(scene), {0.05, 0.0}, 1.0);
 
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(x[static_cast<std::size_t>(PlanarLayout{3}.pose(i))], i * d + 0.05, 1e-3) << i;
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(x[static_cast<std::size_t>(PlanarLayout{3}.pose(i))], i * d + 0.05, 1e-3) << i;
 }
 
 TEST(Planar, BoxesPushBoxesAndDiscs) {
-  const Scene scene = pushing_scene(-0.0545 - kPusher, 0.0, {slider_box("a", 0, 0), slider_box("b", 0.115, 0.02), slider_disc("c", 0.23, 0.0)});
+  const Scene scene = pushing_scene(-0.0545 - kPusher, 0.0,
+                                    {slider_box("a", 0, 0), slider_box("b", 0.115, 0.02), slider_disc("c", 0.23, 0.0)});
   QuasiStaticModel sut(scene, {});
   auto x = planar_start(scene);
 
@@ -188,7 +193,8 @@ TEST(FindContacts, BoxesEdgeToEdgeHaveTwo) {
 TEST(FindContacts, CornerIntoEdge) {
   const Outline box{.half_x = 0.05, .half_y = 0.05};
   const double reach = 0.05 * std::numbers::sqrt2;
-  const Contacts contacts = find_contacts(box, PlanarPose(0.05 + reach - 0.002, 0.01, std::numbers::pi / 4), box, PlanarPose());
+  const Contacts contacts =
+      find_contacts(box, PlanarPose(0.05 + reach - 0.002, 0.01, std::numbers::pi / 4), box, PlanarPose());
   ASSERT_FALSE(contacts.empty());
   EXPECT_NEAR(contacts.begin()->depth, 0.002, 1e-9);
   EXPECT_NEAR(contacts.begin()->point.y(), 0.01, 1e-9);
@@ -203,7 +209,8 @@ TEST(MakeCoarseModel, SaysWhatItWants) {
   }
   const auto unknown = make_coarse_model("astrology", scene);
   ASSERT_FALSE(unknown);
-  EXPECT_THAT(unknown.error().message, HasSubstr("got 'astrology', wanted kinematic, limit-surface, planar or learned:FILE"));
+  EXPECT_THAT(unknown.error().message,
+              HasSubstr("got 'astrology', wanted kinematic, limit-surface, planar or learned:FILE"));
 
   Scene gripper = scene;
   gripper.robot.model = "planar_gripper";

@@ -36,7 +36,8 @@ TEST(AnalyticModelAllocation, NoneAfterConstruction) {
   for (const char* name : {"kinematic", "limit-surface", "planar"}) {
     const auto sut = std::move(make_coarse_model(name, scene)).value();
     std::vector<double> states(static_cast<std::size_t>(sut->layout().size())), controls{0.05, 0.01};
-    for (int i = 0; i < 4; ++i) states[static_cast<std::size_t>(sut->layout().pose(i))] = 0.08 + 0.1 * i;  // overlapping
+    for (int i = 0; i < 4; ++i)
+      states[static_cast<std::size_t>(sut->layout().pose(i))] = 0.08 + 0.1 * i;  // overlapping
     const long before = allocations;
     sut->advance(states, controls, 1.0);
     EXPECT_EQ(allocations - before, 0) << name;

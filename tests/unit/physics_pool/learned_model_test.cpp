@@ -45,13 +45,12 @@ std::vector<double> state_of(double px, double py, const std::vector<Slider>& sl
 }
 
 // Four sliders that the pusher reaches, directly or not.
-const std::vector<Slider> kCrowd{{0.08, 0.02, 0.3, 0.01, 0.02, 0.1},
-                                 {0.19, 0.01, -1.0},
-                                 {0.1, 0.13, 2.0},
-                                 {0.13, -0.1, 3.0, 0.0, -0.03, 0.0}};
+const std::vector<Slider> kCrowd{
+    {0.08, 0.02, 0.3, 0.01, 0.02, 0.1}, {0.19, 0.01, -1.0}, {0.1, 0.13, 2.0}, {0.13, -0.1, 3.0, 0.0, -0.03, 0.0}};
 constexpr std::array<double, 2> kAhead{0.09, 0.03};
 
-std::vector<double> advanced(CoarseModel& sut, std::vector<double> state, std::array<double, 2> u, double duration = 1.0) {
+std::vector<double> advanced(CoarseModel& sut, std::vector<double> state, std::array<double, 2> u,
+                             double duration = 1.0) {
   sut.advance(state, u, duration);
   return state;
 }
@@ -99,13 +98,15 @@ TEST_P(LearnedModelSymmetry, OfTheFineModelIsExact) {
   for (const auto& u : {kAhead, std::array{0.1, 0.0}, std::array{0.07, 0.07}}) {
     const auto expected = motion.moved(advanced(*sut, start, u));
     const auto end = advanced(*sut, motion.moved(start), motion.turned(u[0], u[1]));
-    for (std::size_t i = 0; i < end.size(); ++i) EXPECT_NEAR(end[i], expected[i], kSame) << "entry " << i << ", u " << u[1];
+    for (std::size_t i = 0; i < end.size(); ++i)
+      EXPECT_NEAR(end[i], expected[i], kSame) << "entry " << i << ", u " << u[1];
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(, LearnedModelSymmetry,
-                         testing::Values(Motion{1}, Motion{2}, Motion{3}, Motion{0, true}, Motion{1, true}, Motion{2, true},
-                                         Motion{3, true}, Motion{0, false, 0.4, -0.7}, Motion{3, true, -0.2, 0.5}));
+                         testing::Values(Motion{1}, Motion{2}, Motion{3}, Motion{0, true}, Motion{1, true},
+                                         Motion{2, true}, Motion{3, true}, Motion{0, false, 0.4, -0.7},
+                                         Motion{3, true, -0.2, 0.5}));
 
 TEST(LearnedModel, DoesNotCareForTheOrderOfSliders) {
   const auto sut = model(4);
@@ -230,20 +231,24 @@ TEST_P(LearnedModelMisfit, IsRefused) {
   const auto sut = make_learned_model(tests::random_network(), scene, "a.net");
   ASSERT_FALSE(sut);
   EXPECT_EQ(sut.error().code, Code::kInvalidArgument);
-  EXPECT_THAT(sut.error().message, testing::AllOf(HasSubstr("a.net: does not fit scene 'sliders'"), HasSubstr(GetParam().told),
-                                                  HasSubstr("choose another coarse model")));
+  EXPECT_THAT(sut.error().message,
+              testing::AllOf(HasSubstr("a.net: does not fit scene 'sliders'"), HasSubstr(GetParam().told),
+                             HasSubstr("choose another coarse model")));
 }
 
 INSTANTIATE_TEST_SUITE_P(
     , LearnedModelMisfit,
-    testing::Values(
-        Misfit{"Gripper", [](Scene& scene) { scene.robot = {}; }, "robot.model: got planar_gripper, wanted pusher"},
-        Misfit{"OtherPusher", [](Scene& scene) { scene.robot.radius = 0.02; }, "robot.radius: got 0.02 m, wanted the 0.0145 m"},
-        Misfit{"NoSlider", [](Scene& scene) { scene.objects.clear(); }, "objects: got 0, wanted 1 to 4"},
-        Misfit{"FiveSliders", [](Scene& scene) { scene.objects.resize(5, scene.objects[0]); }, "objects: got 5, wanted 1 to 4"},
-        Misfit{"Box", [](Scene& scene) { scene.objects[1].shape = Shape::kBox; }, "objects[1].shape: got box, wanted cylinder"},
-        Misfit{"OtherSlider", [](Scene& scene) { scene.objects[1].radius = 0.04; },
-               "objects[1].radius: got 0.04 m, wanted the 0.05115 m"}),
+    testing::Values(Misfit{"Gripper", [](Scene& scene) { scene.robot = {}; },
+                           "robot.model: got planar_gripper, wanted pusher"},
+                    Misfit{"OtherPusher", [](Scene& scene) { scene.robot.radius = 0.02; },
+                           "robot.radius: got 0.02 m, wanted the 0.0145 m"},
+                    Misfit{"NoSlider", [](Scene& scene) { scene.objects.clear(); }, "objects: got 0, wanted 1 to 4"},
+                    Misfit{"FiveSliders", [](Scene& scene) { scene.objects.resize(5, scene.objects[0]); },
+                           "objects: got 5, wanted 1 to 4"},
+                    Misfit{"Box", [](Scene& scene) { scene.objects[1].shape = Shape::kBox; },
+                           "objects[1].shape: got box, wanted cylinder"},
+                    Misfit{"OtherSlider", [](Scene& scene) { scene.objects[1].radius = 0.04; },
+                           "objects[1].radius: got 0.04 m, wanted the 0.05115 m"}),
     [](const auto& tested) { return tested.param.name; });
 
 }  // namespace

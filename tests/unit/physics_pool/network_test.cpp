@@ -71,7 +71,10 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Case{"OtherFile", "jostle-network 1", "PNG", {"magic", "wanted a first line 'jostle-network 1'"}},
         Case{"OtherVersion", "jostle-network 1", "jostle-network 2", {"version: got '2', wanted 1"}},
-        Case{"MissingLine", "slider_mass 0.5\n", "", {"slider_mass: got a line 'slider_friction", "wanted 'slider_mass"}},
+        Case{"MissingLine",
+             "slider_mass 0.5\n",
+             "",
+             {"slider_mass: got a line 'slider_friction", "wanted 'slider_mass"}},
         Case{"NoNumber", "duration 1\n", "duration one\n", {"duration: got 'one', wanted a number in [0.001, 60]"}},
         Case{"OutOfRange", "duration 1\n", "duration -1\n", {"duration: got '-1', wanted a number in"}},
         Case{"NaN", "duration 1\n", "duration nan\n", {"duration: got 'nan', wanted a number in"}},
@@ -80,11 +83,17 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"ZeroScale", "input_scale 0.1", "input_scale 0", {"input_scale: got '0', wanted a number in"}},
         Case{"OtherInputs", kShape, "layers 3 12 " + std::to_string(kOutputs), {"layers: got 3 inputs", "wanted"}},
         Case{"OtherOutputs", kShape, "layers " + std::to_string(kInputs) + " 12 3", {"and 3 outputs, wanted"}},
-        Case{"HalfANeuron", kShape, "layers " + std::to_string(kInputs) + " 12.5 " + std::to_string(kOutputs),
+        Case{"HalfANeuron",
+             kShape,
+             "layers " + std::to_string(kInputs) + " 12.5 " + std::to_string(kOutputs),
              {"layers: got 12.5 neurons, wanted a whole number"}},
-        Case{"HugeLayer", kShape, "layers " + std::to_string(kInputs) + " 1e9 " + std::to_string(kOutputs),
+        Case{"HugeLayer",
+             kShape,
+             "layers " + std::to_string(kInputs) + " 1e9 " + std::to_string(kOutputs),
              {"layers: got '1e9', wanted a number in [1, 4096]"}},
-        Case{"OtherShape", kShape, "layers " + std::to_string(kInputs) + " 13 " + std::to_string(kOutputs),
+        Case{"OtherShape",
+             kShape,
+             "layers " + std::to_string(kInputs) + " 13 " + std::to_string(kOutputs),
              {"the file is cut off"}}),
     [](const auto& tested) { return tested.param.name; });
 
@@ -95,7 +104,8 @@ TEST(NetworkFile, ThatIsCutOffAnywhereIsRefused) {
   }
   const auto sut = parse_network(std::string_view(content).substr(0, content.size() - 1), "cut.net");
   ASSERT_FALSE(sut);
-  EXPECT_THAT(sut.error().message, HasSubstr("cut.net: biases of layer 2: the file is cut off: got 95 bytes, wanted 96"));
+  EXPECT_THAT(sut.error().message,
+              HasSubstr("cut.net: biases of layer 2: the file is cut off: got 95 bytes, wanted 96"));
 }
 
 TEST(NetworkFile, ThatIsTooLongIsRefused) {

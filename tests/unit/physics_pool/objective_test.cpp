@@ -67,8 +67,7 @@ TEST_F(ObjectiveTerms, GoalDistanceAndAngleFollowTheHand) {
       const TargetBearing bearing = target_bearing(geometry, start);
       EXPECT_NEAR(bearing.distance, 0.05, 1e-12);
       EXPECT_NEAR(bearing.angle, std::atan2(0.03, 0.04), 1e-9);
-      EXPECT_NEAR(goal_cost(geometry, start, 2.0),
-                  0.05 * 0.05 + 2.0 * std::pow(std::atan2(0.03, 0.04), 2), 1e-9);
+      EXPECT_NEAR(goal_cost(geometry, start, 2.0), 0.05 * 0.05 + 2.0 * std::pow(std::atan2(0.03, 0.04), 2), 1e-9);
     }
   }
 }
@@ -280,9 +279,17 @@ TEST_F(ObjectiveTerms, ObstructionsAreOtherObjectsBetweenTheFingers) {
 }
 
 TEST_F(ObjectiveTerms, RunningCostIsTheWeightedSum) {
-  const Objective weights{.acceleration = 3, .disturbance = 5, .disturbance_rotation = 0, .edge = 7,
-                          .edge_rate = 10, .edge_exponent_max = 50, .edge_margin = 0.05,
-                          .topple = 11, .topple_angle = 0.5, .drop = 13, .drop_height = 0.02};
+  const Objective weights{.acceleration = 3,
+                          .disturbance = 5,
+                          .disturbance_rotation = 0,
+                          .edge = 7,
+                          .edge_rate = 10,
+                          .edge_exponent_max = 50,
+                          .edge_margin = 0.05,
+                          .topple = 11,
+                          .topple_angle = 0.5,
+                          .drop = 13,
+                          .drop_height = 0.02};
   State after = start;
   place(after, 1, 0.29, start.q[5 + 7 + 1]);  // from x = 0.05: 24 cm
   turn(after, 2, 1.0, 1, 0, 0);
@@ -308,11 +315,9 @@ TEST_F(ObjectiveTerms, AreNeverNegativeOrInfiniteForRandomStates) {
     const std::vector<double> u0{random.normal(0, 1), random.normal(0, 1), random.normal(0, 1), random.normal(0, 1)};
     const std::vector<double> u1{random.normal(0, 1), random.normal(0, 1), random.normal(0, 1), random.normal(0, 1)};
     for (const double cost :
-         {goal_cost(geometry, b, objective.angle), acceleration_cost(u0, u1),
-          disturbance_cost(geometry, a, b, 1.0), edge_cost(geometry, a, b, objective),
-          double(toppled_objects(geometry, b, objective.topple_angle)),
-          double(count_dropped(geometry, b, objective.drop_height)),
-          running_cost(geometry, objective, u0, u1, a, b)}) {
+         {goal_cost(geometry, b, objective.angle), acceleration_cost(u0, u1), disturbance_cost(geometry, a, b, 1.0),
+          edge_cost(geometry, a, b, objective), double(toppled_objects(geometry, b, objective.topple_angle)),
+          double(count_dropped(geometry, b, objective.drop_height)), running_cost(geometry, objective, u0, u1, a, b)}) {
       ASSERT_GE(cost, 0.0);
       ASSERT_TRUE(std::isfinite(cost));
     }
@@ -321,9 +326,9 @@ TEST_F(ObjectiveTerms, AreNeverNegativeOrInfiniteForRandomStates) {
 
 TEST(Objective, DefaultsPassTheirOwnChecks) {
   const Objective o;
-  for (const double weight : {o.goal, o.angle, o.acceleration, o.disturbance, o.disturbance_rotation,
-                              o.edge, o.edge_rate, o.edge_exponent_max, o.edge_margin, o.topple,
-                              o.topple_angle, o.drop, o.drop_height, o.success_cost}) {
+  for (const double weight :
+       {o.goal, o.angle, o.acceleration, o.disturbance, o.disturbance_rotation, o.edge, o.edge_rate,
+        o.edge_exponent_max, o.edge_margin, o.topple, o.topple_angle, o.drop, o.drop_height, o.success_cost}) {
     EXPECT_GE(weight, 0.0);
     EXPECT_TRUE(std::isfinite(weight));
   }

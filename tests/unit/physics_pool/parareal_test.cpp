@@ -43,8 +43,7 @@ State relax(const State& start, double u) {
 }
 
 struct Recursion {
-  explicit Recursion(const PararealStop& stop, int steps = 4)
-      : scene(one_slider()), update(scene), coarse(scene) {
+  explicit Recursion(const PararealStop& stop, int steps = 4) : scene(one_slider()), update(scene), coarse(scene) {
     controls.nu = kPusherAxes;
     for (int t = 0; t < steps; ++t) controls.append(std::vector{0.01 * t, 0.0});
     x0 = initial_state(scene);
@@ -61,9 +60,7 @@ struct Recursion {
     }
   }
 
-  State fine(const PararealIteration::Slice& slice) const {
-    return relax(*slice.start, controls.step(slice.step)[0]);
-  }
+  State fine(const PararealIteration::Slice& slice) const { return relax(*slice.start, controls.step(slice.step)[0]); }
 
   std::vector<State> serial() const {
     std::vector<State> states{x0};
@@ -102,7 +99,8 @@ TEST(PararealIteration, EveryLevelIsOneStateMoreExact) {
     ASSERT_TRUE(recursion.sut->done());
     const auto serial = recursion.serial();
     for (int n = 0; n <= k; ++n) {
-      EXPECT_EQ(recursion.sut->states()[static_cast<std::size_t>(n)], serial[static_cast<std::size_t>(n)]) << k << " " << n;
+      EXPECT_EQ(recursion.sut->states()[static_cast<std::size_t>(n)], serial[static_cast<std::size_t>(n)])
+          << k << " " << n;
     }
     EXPECT_EQ(recursion.sut->states()[4] == serial[4], k == 4) << k;
   }
@@ -209,7 +207,7 @@ TEST(PlanarUpdate, CorrectionKeepsToItsLimit) {
   now = before;
   now[2] += 0.001;  // the starts are 1 mm apart,
   std::vector<double> far = now;
-  far[2] += 0.1;    // and C has lost the slider from one of them
+  far[2] += 0.1;  // and C has lost the slider from one of them
 
   sut.correct(x, {now, far}, {before, before}, 2.0);
 
@@ -260,9 +258,7 @@ TEST(PlanarUpdate, ProjectionSeparatesManyBodies) {
 
 class PararealOnThreads : public ::testing::TestWithParam<int> {
  protected:
-  PararealOnThreads() : scene(GetParam() == 1 ? one_slider() : four_sliders()) {
-    EXPECT_TRUE(threads.load(scene));
-  }
+  PararealOnThreads() : scene(GetParam() == 1 ? one_slider() : four_sliders()) { EXPECT_TRUE(threads.load(scene)); }
 
   BatchReply predict(const RolloutBatch& batch, PararealOptions options) {
     PararealPool sut(threads, std::move(options));
@@ -382,13 +378,15 @@ TEST(Split, OneSampleGoesAcrossTime) {
 }
 
 TEST(Split, ManySamplesGoAcrossWorkers) {
-  const Split split = choose_split({.samples = 20, .steps = 4, .workers = 4, .iterations = 2, .coarse = 1e-6, .fine = 0.01});
+  const Split split =
+      choose_split({.samples = 20, .steps = 4, .workers = 4, .iterations = 2, .coarse = 1e-6, .fine = 0.01});
   EXPECT_EQ(split.whole, 20);
 }
 
 TEST(Split, TheRestOfABatchIsSliced) {
   // Four whole samples fill four workers; the fifth would keep three of them idle.
-  const Split split = choose_split({.samples = 5, .steps = 4, .workers = 4, .iterations = 1, .coarse = 1e-6, .fine = 0.01});
+  const Split split =
+      choose_split({.samples = 5, .steps = 4, .workers = 4, .iterations = 1, .coarse = 1e-6, .fine = 0.01});
   EXPECT_GT(split.sliced, 0);
   EXPECT_LT(split.seconds, split.all_whole);
 }

@@ -31,8 +31,10 @@ Scene one_large(Shape shape) {
   Scene scene = tests::target_only();
   SceneObject& object = scene.objects[0];
   object.shape = shape;
-  if (shape == Shape::kBox) object.size = {0.2, 0.2, 0.2};
-  else object = {.name = "target", .shape = shape, .radius = 0.2, .height = 0.2, .mass = 0.5, .friction = 0.4};
+  if (shape == Shape::kBox)
+    object.size = {0.2, 0.2, 0.2};
+  else
+    object = {.name = "target", .shape = shape, .radius = 0.2, .height = 0.2, .mass = 0.5, .friction = 0.4};
   scene.robot.x = -0.5;
   return scene;
 }
@@ -120,9 +122,8 @@ TEST_P(PerturbAt, NeverMakesASizeOrMassThatIsNotPositive) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Levels, PerturbAt, testing::ValuesIn(kLevels), [](const auto& level) {
-  return std::string(to_string(level.param));
-});
+INSTANTIATE_TEST_SUITE_P(Levels, PerturbAt, testing::ValuesIn(kLevels),
+                         [](const auto& level) { return std::string(to_string(level.param)); });
 
 TEST(Perturb, ChangesNothingAtLevelNone) {
   const Scene truth = tests::three_objects();
@@ -140,7 +141,8 @@ TEST(Uncertainty, ReadsItsOwnWords) {
 TEST(Uncertainty, RefusesOtherWords) {
   const auto level = parse_uncertainty("extreme");
   ASSERT_FALSE(level);
-  EXPECT_THAT(level.error().message, testing::AllOf(testing::HasSubstr("'extreme'"), testing::HasSubstr("none, low, medium or high")));
+  EXPECT_THAT(level.error().message,
+              testing::AllOf(testing::HasSubstr("'extreme'"), testing::HasSubstr("none, low, medium or high")));
 }
 
 TEST(VelocityNoise, GrowsInEqualStepsFromZero) {
@@ -164,8 +166,7 @@ class ObservedStateAt : public PerturbAt {};
 TEST_P(ObservedStateAt, StartsWhereThePlanningWorldHasTheObjects) {
   const Scene truth = tests::three_objects();
   const Scene belief = perturb(truth, GetParam(), 4);
-  EXPECT_EQ(observed_state(truth, belief, initial_state(truth), Measurement::kInitial),
-            initial_state(belief));
+  EXPECT_EQ(observed_state(truth, belief, initial_state(truth), Measurement::kInitial), initial_state(belief));
 }
 
 TEST_P(ObservedStateAt, SeesMovedObjectsWhereTheyAreAtTheirBelievedHeight) {
@@ -185,9 +186,8 @@ TEST_P(ObservedStateAt, SeesMovedObjectsWhereTheyAreAtTheirBelievedHeight) {
   EXPECT_EQ(seen.q, x.q);  // nothing else differs
 }
 
-INSTANTIATE_TEST_SUITE_P(Levels, ObservedStateAt, testing::ValuesIn(kLevels), [](const auto& level) {
-  return std::string(to_string(level.param));
-});
+INSTANTIATE_TEST_SUITE_P(Levels, ObservedStateAt, testing::ValuesIn(kLevels),
+                         [](const auto& level) { return std::string(to_string(level.param)); });
 
 }  // namespace
 }  // namespace jostle::physics_pool

@@ -37,9 +37,7 @@ TEST_F(PushTerms, GoalCostIsTheSquaredDistanceFromTheRegionsCentre) {
   EXPECT_NEAR(goal_cost(geometry, start, 1.0), 0.25, 1e-15);
 }
 
-TEST_F(PushTerms, ThereIsNoHandToObstruct) {
-  EXPECT_EQ(count_obstructions(geometry, start), 0);
-}
+TEST_F(PushTerms, ThereIsNoHandToObstruct) { EXPECT_EQ(count_obstructions(geometry, start), 0); }
 
 TEST_F(PushTerms, ObstacleCostFallsWithTheSquaredDistances) {
   const Objective weights{.obstacle_target = 3, .obstacle_pusher = 5};
@@ -79,8 +77,13 @@ TEST_F(PushTerms, TargetHitsTheObstacleWhereFootprintsMeet) {
 // A box 0.1 x 0.2 whose long side, turned by 90 degrees, reaches the obstacle.
 TEST_F(PushTerms, TargetHitsTheObstacleAsItIsTurned) {
   Scene boxes = tests::push_around();
-  boxes.objects[0] = {.name = "target", .shape = Shape::kBox, .size = {0.1, 0.2, 0.02}, .mass = 0.5,
-                      .friction = 0.8, .x = -0.12, .y = 0.0};
+  boxes.objects[0] = {.name = "target",
+                      .shape = Shape::kBox,
+                      .size = {0.1, 0.2, 0.02},
+                      .mass = 0.5,
+                      .friction = 0.8,
+                      .x = -0.12,
+                      .y = 0.0};
   const TaskGeometry turned(boxes);
   State x = initial_state(boxes);
   EXPECT_FALSE(target_hits_obstacle(turned, x));
@@ -104,8 +107,8 @@ TEST_F(PushTerms, CollisionsCountTargetAndPusher) {
   EXPECT_EQ(count_collisions(geometry, start), 1);
   start.q[kJointX] = -0.02;
   EXPECT_EQ(count_collisions(geometry, start), 2);
-  const Objective weights{.acceleration = 0, .disturbance = 0, .obstacle_target = 0, .obstacle_pusher = 0,
-                          .collision = 7};
+  const Objective weights{
+      .acceleration = 0, .disturbance = 0, .obstacle_target = 0, .obstacle_pusher = 0, .collision = 7};
   const std::vector<double> u{0, 0};
   EXPECT_EQ(running_cost(geometry, weights, u, u, start, start), 14.0);
 }
@@ -130,8 +133,14 @@ TEST_F(PushTerms, AtGoalIsTheTargetsCentreInsideTheRegion) {
 }
 
 TEST_F(PushTerms, RunningCostIsTheWeightedSum) {
-  const Objective weights{.acceleration = 3, .disturbance = 5, .edge = 7, .edge_margin = 0.05, .drop = 13,
-                          .obstacle_target = 17, .obstacle_pusher = 19, .intrusion = 23};
+  const Objective weights{.acceleration = 3,
+                          .disturbance = 5,
+                          .edge = 7,
+                          .edge_margin = 0.05,
+                          .drop = 13,
+                          .obstacle_target = 17,
+                          .obstacle_pusher = 19,
+                          .intrusion = 23};
   State after = start;
   place(after, 0, 0.0, 0.2);
   place(after, 1, 0.2, 0.0);  // from (0, 0.25)
@@ -153,7 +162,8 @@ TEST_F(PushTerms, AreNeverNegativeOrInfiniteForRandomStates) {
         for (int j = 0; j < 3; ++j) object(*x, k)[j] = random.normal(0, 0.1);
       }
     }
-    const std::vector<double> u0{random.normal(0, 1), random.normal(0, 1)}, u1{random.normal(0, 1), random.normal(0, 1)};
+    const std::vector<double> u0{random.normal(0, 1), random.normal(0, 1)},
+        u1{random.normal(0, 1), random.normal(0, 1)};
     for (const double cost : {running_cost(geometry, objective, u0, u1, a, b), final_cost(geometry, objective, b),
                               obstacle_cost(geometry, b, objective)}) {
       ASSERT_GE(cost, 0.0);

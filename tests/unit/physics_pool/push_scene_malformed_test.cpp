@@ -43,8 +43,10 @@ void PrintTo(const Case& value, std::ostream* out) { *out << value.name; }
 std::string replaced(const std::string& from, const std::string& to) {
   std::string text = kGood;
   const auto at = text.find(from);
-  if (at == std::string::npos) ADD_FAILURE() << "no '" << from << "' in the good scene";
-  else text.replace(at, from.size(), to);
+  if (at == std::string::npos)
+    ADD_FAILURE() << "no '" << from << "' in the good scene";
+  else
+    text.replace(at, from.size(), to);
   return text;
 }
 
@@ -60,24 +62,57 @@ TEST_P(MalformedPushScene, IsRefusedWithFileLineFieldGotAndWanted) {
 }
 
 const std::vector<Case> kCases{
-    {"PushWithAGripper", "model: pusher", "model: planar_gripper", {"bad.yaml:11", "task.kind", "got 'push' for a planar_gripper", "push with a pusher"}},
-    {"GraspWithAPusher", "kind: push", "kind: grasp", {"bad.yaml:11", "task.kind", "got 'grasp' for a pusher", "grasp with a planar_gripper"}},
-    {"UnknownRobot", "model: pusher", "model: broom", {"bad.yaml:4", "robot.model", "got 'broom'", "planar_gripper, pusher"}},
+    {"PushWithAGripper",
+     "model: pusher",
+     "model: planar_gripper",
+     {"bad.yaml:11", "task.kind", "got 'push' for a planar_gripper", "push with a pusher"}},
+    {"GraspWithAPusher",
+     "kind: push",
+     "kind: grasp",
+     {"bad.yaml:11", "task.kind", "got 'grasp' for a pusher", "grasp with a planar_gripper"}},
+    {"UnknownRobot",
+     "model: pusher",
+     "model: broom",
+     {"bad.yaml:4", "robot.model", "got 'broom'", "planar_gripper, pusher"}},
     {"UnknownTask", "kind: push", "kind: pull", {"bad.yaml:11", "task.kind", "got 'pull'", "grasp, push"}},
     {"NoGoal", "  goal: {x: 0.2, y: 0, radius: 0.04}\n", "", {"bad.yaml:11", "task.goal", "missing"}},
-    {"GoalWithoutRadius", "goal: {x: 0.2, y: 0, radius: 0.04}", "goal: {x: 0.2, y: 0}", {"bad.yaml:13", "task.goal.radius", "missing", "wanted a number"}},
-    {"GoalOffTheTable", "goal: {x: 0.2", "goal: {x: 0.6", {"bad.yaml:13", "task.goal.x", "got 0.6", "-0.5 to 0.5 m, on the surface"}},
+    {"GoalWithoutRadius",
+     "goal: {x: 0.2, y: 0, radius: 0.04}",
+     "goal: {x: 0.2, y: 0}",
+     {"bad.yaml:13", "task.goal.radius", "missing", "wanted a number"}},
+    {"GoalOffTheTable",
+     "goal: {x: 0.2",
+     "goal: {x: 0.6",
+     {"bad.yaml:13", "task.goal.x", "got 0.6", "-0.5 to 0.5 m, on the surface"}},
     {"NaNGoal", "goal: {x: 0.2", "goal: {x: .nan", {"bad.yaml:13", "task.goal.x", "got nan", "on the surface"}},
     {"GoalOfNoSize", "radius: 0.04}", "radius: 0}", {"bad.yaml:13", "task.goal.radius", "got 0", "0.002 to 2 m"}},
-    {"NaNObstacle", "radius: 0.05}\n", "radius: .nan}\n", {"bad.yaml:14", "task.obstacle.radius", "got nan", "0.002 to 2 m"}},
+    {"NaNObstacle",
+     "radius: 0.05}\n",
+     "radius: .nan}\n",
+     {"bad.yaml:14", "task.obstacle.radius", "got nan", "0.002 to 2 m"}},
     {"NegativeObstacle", "radius: 0.05}\n", "radius: -0.05}\n", {"bad.yaml:14", "task.obstacle.radius", "got -0.05"}},
-    {"ObstacleOffTheTable", "obstacle: {x: 0, y: 0", "obstacle: {x: 0, y: 0.5", {"bad.yaml:14", "task.obstacle.y", "got 0.5", "-0.4 to 0.4 m, on the surface"}},
-    {"ObstacleAsANumber", "obstacle: {x: 0, y: 0, radius: 0.05}", "obstacle: 0.05", {"bad.yaml:14", "task.obstacle", "got '0.05'", "wanted a mapping"}},
-    {"UnknownObstacleKey", "radius: 0.05}\n", "radius: 0.05, height: 1}\n", {"bad.yaml:14", "task.obstacle.height", "unknown key", "radius, x, y"}},
+    {"ObstacleOffTheTable",
+     "obstacle: {x: 0, y: 0",
+     "obstacle: {x: 0, y: 0.5",
+     {"bad.yaml:14", "task.obstacle.y", "got 0.5", "-0.4 to 0.4 m, on the surface"}},
+    {"ObstacleAsANumber",
+     "obstacle: {x: 0, y: 0, radius: 0.05}",
+     "obstacle: 0.05",
+     {"bad.yaml:14", "task.obstacle", "got '0.05'", "wanted a mapping"}},
+    {"UnknownObstacleKey",
+     "radius: 0.05}\n",
+     "radius: 0.05, height: 1}\n",
+     {"bad.yaml:14", "task.obstacle.height", "unknown key", "radius, x, y"}},
     {"PusherOfNoSize", "radius: 0.0145", "radius: 0", {"bad.yaml:6", "robot.radius", "got 0", "0.002 to 2 m"}},
     {"InfinitePusher", "height: 0.11", "height: .inf", {"bad.yaml:7", "robot.height", "got inf", "0.002 to 2 m"}},
-    {"PusherInTheTarget", "{x: -0.28, y: 0}", "{x: -0.26, y: 0}", {"bad.yaml:9", "'a'", "inside the robot", "wanted a free place"}},
-    {"UnknownIntegrator", "integrator: rk4", "integrator: rk5", {"bad.yaml:15", "physics.integrator", "got 'rk5'", "euler, rk4"}},
+    {"PusherInTheTarget",
+     "{x: -0.28, y: 0}",
+     "{x: -0.26, y: 0}",
+     {"bad.yaml:9", "'a'", "inside the robot", "wanted a free place"}},
+    {"UnknownIntegrator",
+     "integrator: rk4",
+     "integrator: rk5",
+     {"bad.yaml:15", "physics.integrator", "got 'rk5'", "euler, rk4"}},
 };
 
 INSTANTIATE_TEST_SUITE_P(EveryKind, MalformedPushScene, testing::ValuesIn(kCases),
@@ -119,7 +154,7 @@ TEST(PushScene, HasTwoJointsAndTwoAxes) {
 TEST(SignedDistance, IsNegativeInsideAndExactOutside) {
   const SceneObject disc = tests::slider("disc", 0.3, 0.4);
   EXPECT_NEAR(signed_distance(disc, {.x = 0, .y = 0, .radius = 0.1}), 0.5 - 0.1 - 0.05115, 1e-15);
-  SceneObject box = tests::box("box", 0.0, 0.0);  // 4 cm x 4 cm
+  SceneObject box = tests::box("box", 0.0, 0.0);                                                  // 4 cm x 4 cm
   EXPECT_NEAR(signed_distance(box, {.x = 0.05, .y = 0.06, .radius = 0.01}), 0.05 - 0.01, 1e-15);  // corner, 3-4-5
   EXPECT_NEAR(signed_distance(box, {.x = 0.025, .y = 0.0, .radius = 0.01}), -0.005, 1e-15);
   box.yaw = 0.7853981633974483;

@@ -115,7 +115,8 @@ TEST(ReducedSimulator, LongStepsKeepTheDrivesStable) {
     ReducedSimulator sut(compile(scene), {.time_step = time_step});
     State x = initial_state(scene);
     const double start = x.q[kJointX];
-    const Advance advance = sut.advance(x, std::array{-0.1, 0.0, 0.0, 0.0}, static_cast<int>(std::lround(1 / time_step)));
+    const Advance advance =
+        sut.advance(x, std::array{-0.1, 0.0, 0.0, 0.0}, static_cast<int>(std::lround(1 / time_step)));
     EXPECT_EQ(advance.diverged, "");
     EXPECT_NEAR(x.q[kJointX] - start, -0.1, 0.006) << time_step;  // it starts late by inertia/kv
     EXPECT_NEAR(x.v[kJointX], -0.1, 1e-3);
@@ -147,7 +148,8 @@ TEST(ReducedSimulator, DependsOnStateAloneWhenModelsWereDropped) {
   ReducedSimulator sut(world, kFrozen);
   const auto spun = [&](std::size_t count) {
     State x = initial_state(world->scene());
-    for (std::size_t i = 0; i < count; ++i) x.v[static_cast<std::size_t>(world->geometry().layout.objects[i].v) + 5] = 1.0;
+    for (std::size_t i = 0; i < count; ++i)
+      x.v[static_cast<std::size_t>(world->geometry().layout.objects[i].v) + 5] = 1.0;
     (void)sut.advance(x, std::array{0.0, 0.0, 0.0, 0.0}, 20);
     return x;
   };
@@ -170,7 +172,8 @@ TEST(StandsStill, OnlyOnTheSurfaceUprightAndAtRest) {
   const Scene scene = tests::target_only();
   const TaskGeometry geometry(scene);
   const State at_rest = initial_state(scene);
-  const auto q = static_cast<std::size_t>(geometry.layout.objects[0].q), v = static_cast<std::size_t>(geometry.layout.objects[0].v);
+  const auto q = static_cast<std::size_t>(geometry.layout.objects[0].q),
+             v = static_cast<std::size_t>(geometry.layout.objects[0].v);
   EXPECT_TRUE(stands_still(geometry, at_rest, 0));
   const auto after = [&](const std::function<void(State&)>& change) {
     State x = at_rest;

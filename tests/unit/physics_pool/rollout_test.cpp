@@ -135,7 +135,8 @@ TEST_F(RolloutTest, SucceedsWhenTheTargetIsInTheHandAndTellsItsSiblings) {
   EXPECT_TRUE(outcome.at_goal);
   EXPECT_TRUE(at_goal(world->geometry(), outcome.trajectory.back(), batch.objective));
   EXPECT_EQ(outcome.trajectory.size(), outcome.steps + 1u);
-  EXPECT_NEAR(outcome.cost, std::accumulate(outcome.step_costs.begin(), outcome.step_costs.end(), 0.0), 1e-9 * outcome.cost);
+  EXPECT_NEAR(outcome.cost, std::accumulate(outcome.step_costs.begin(), outcome.step_costs.end(), 0.0),
+              1e-9 * outcome.cost);
   EXPECT_TRUE(signals.is_obsolete(8));
   EXPECT_FALSE(signals.is_obsolete(7));
 }

@@ -150,9 +150,8 @@ constexpr std::array<KnownAnswer, 3> kKnownAnswers{{
 
 TEST(Philox, GivesItsKnownAnswers) {
   for (const KnownAnswer& known : kKnownAnswers) {
-    const auto output = r123::Philox4x32{}(
-        {{known.counter[0], known.counter[1], known.counter[2], known.counter[3]}},
-        {{known.key[0], known.key[1]}});
+    const auto output = r123::Philox4x32{}({{known.counter[0], known.counter[1], known.counter[2], known.counter[3]}},
+                                           {{known.key[0], known.key[1]}});
     for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(output[i], known.output[i]);
   }
 }
@@ -162,10 +161,8 @@ TEST(Philox, GivesItsKnownAnswers) {
 TEST(StandardUniform, IsPhiloxOfSeedAndIndex) {
   for (const KnownAnswer& known : kKnownAnswers) {
     const std::uint64_t seed = (std::uint64_t{known.key[1]} << 32) | known.key[0];
-    const double wanted =
-        std::ldexp(double(known.output[0]), -32) + std::ldexp(double(known.output[1]) + 0.5, -64);
-    EXPECT_DOUBLE_EQ(standard_uniform(seed, {known.counter[0], known.counter[1], known.counter[2],
-                                             known.counter[3]}),
+    const double wanted = std::ldexp(double(known.output[0]), -32) + std::ldexp(double(known.output[1]) + 0.5, -64);
+    EXPECT_DOUBLE_EQ(standard_uniform(seed, {known.counter[0], known.counter[1], known.counter[2], known.counter[3]}),
                      wanted);
   }
 }
@@ -197,9 +194,7 @@ TEST(CounterStream, TossesAFairCoin) {
   EXPECT_NEAR(heads, kDraws / 2.0, 5 * std::sqrt(kDraws / 4.0));
 }
 
-SamplingLaw law() {
-  return {.sigma = {0.1, 0.2, 0.0}, .limit = {100, 100, 100}, .seed = 77, .stream = 3};
-}
+SamplingLaw law() { return {.sigma = {0.1, 0.2, 0.0}, .limit = {100, 100, 100}, .seed = 77, .stream = 3}; }
 
 TEST(SampleControls, AddsTheNoiseOfEveryIndex) {
   const ControlSequence nominal{.nu = 3, .values = {1, 2, 3, 4, 5, 6}};

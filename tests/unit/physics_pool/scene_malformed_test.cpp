@@ -50,8 +50,10 @@ void PrintTo(const Case& value, std::ostream* out) { *out << value.name; }
 std::string replaced(const std::string& from, const std::string& to) {
   std::string text = kGood;
   const auto at = text.find(from);
-  if (at == std::string::npos) ADD_FAILURE() << "no '" << from << "' in the good scene";
-  else text.replace(at, from.size(), to);
+  if (at == std::string::npos)
+    ADD_FAILURE() << "no '" << from << "' in the good scene";
+  else
+    text.replace(at, from.size(), to);
   return text;
 }
 
@@ -77,41 +79,110 @@ const std::vector<Case> kCases{
     {"TabIndent", "  model:", "\tmodel:", {"bad.yaml:5", "not YAML"}},
     {"MissingVersion", "jostle_scene: 1", "", {"bad.yaml:", "jostle_scene", "missing", "wanted a whole number"}},
     {"OtherVersion", "jostle_scene: 1", "jostle_scene: 2", {"bad.yaml:1", "jostle_scene", "got version 2", "wanted 1"}},
-    {"FractionalVersion", "jostle_scene: 1", "jostle_scene: 1.5", {"bad.yaml:1", "jostle_scene", "got '1.5'", "wanted a whole number"}},
+    {"FractionalVersion",
+     "jostle_scene: 1",
+     "jostle_scene: 1.5",
+     {"bad.yaml:1", "jostle_scene", "got '1.5'", "wanted a whole number"}},
     {"MissingMass", "    mass: 0.5\n", "", {"bad.yaml:8", "objects[0].mass", "missing", "wanted a number"}},
     {"MissingName", "name: a\n    shape", "shape", {"bad.yaml:8", "objects[0].name", "missing", "wanted text"}},
-    {"MissingSize", "    size: [0.04, 0.04, 0.04]\n", "", {"bad.yaml:8", "objects[0].size", "missing", "wanted 3 numbers"}},
+    {"MissingSize",
+     "    size: [0.04, 0.04, 0.04]\n",
+     "",
+     {"bad.yaml:8", "objects[0].size", "missing", "wanted 3 numbers"}},
     {"MissingRadius", "    radius: 0.04\n", "", {"bad.yaml:14", "objects[1].radius", "missing", "wanted a number"}},
-    {"MissingPose", "    pose: {x: 0, y: 0, yaw: 0}\n", "", {"bad.yaml:8", "objects[0].pose", "missing", "wanted a mapping"}},
-    {"MissingPoseX", "{x: 0, y: 0, yaw: 0}", "{y: 0}", {"bad.yaml:13", "objects[0].pose.x", "missing", "wanted a number"}},
+    {"MissingPose",
+     "    pose: {x: 0, y: 0, yaw: 0}\n",
+     "",
+     {"bad.yaml:8", "objects[0].pose", "missing", "wanted a mapping"}},
+    {"MissingPoseX",
+     "{x: 0, y: 0, yaw: 0}",
+     "{y: 0}",
+     {"bad.yaml:13", "objects[0].pose.x", "missing", "wanted a number"}},
     {"MissingTask", "task: {kind: grasp, target: a}\n", "", {"bad.yaml:", "task", "missing", "wanted a mapping"}},
-    {"MissingTarget", "kind: grasp, target: a", "kind: grasp", {"bad.yaml:21", "task.target", "missing", "wanted text"}},
+    {"MissingTarget",
+     "kind: grasp, target: a",
+     "kind: grasp",
+     {"bad.yaml:21", "task.target", "missing", "wanted text"}},
     {"TextForNumber", "mass: 0.5", "mass: heavy", {"bad.yaml:11", "objects[0].mass", "got 'heavy'", "wanted a number"}},
-    {"NumberWithUnit", "mass: 0.5", "mass: 0.5 kg", {"bad.yaml:11", "objects[0].mass", "got '0.5 kg'", "wanted a number"}},
-    {"ListForNumber", "mass: 0.5", "mass: [0.5]", {"bad.yaml:11", "objects[0].mass", "got a list of 1", "wanted a number"}},
+    {"NumberWithUnit",
+     "mass: 0.5",
+     "mass: 0.5 kg",
+     {"bad.yaml:11", "objects[0].mass", "got '0.5 kg'", "wanted a number"}},
+    {"ListForNumber",
+     "mass: 0.5",
+     "mass: [0.5]",
+     {"bad.yaml:11", "objects[0].mass", "got a list of 1", "wanted a number"}},
     {"NothingForNumber", "mass: 0.5", "mass:", {"bad.yaml:", "objects[0].mass", "got nothing", "wanted a number"}},
-    {"MappingForText", "name: a\n", "name: {a: b}\n", {"bad.yaml:8", "objects[0].name", "got a mapping", "wanted text"}},
-    {"TwoNumbersForThree", "[0.04, 0.04, 0.04]", "[0.04, 0.04]", {"bad.yaml:10", "objects[0].size", "got a list of 2", "wanted 3 numbers"}},
-    {"TextInList", "[0.04, 0.04, 0.04]", "[0.04, wide, 0.04]", {"bad.yaml:10", "objects[0].size[1]", "got 'wide'", "wanted a number"}},
-    {"ScalarForMapping", "surface: {kind: table, size: [0.6, 0.6]}", "surface: 3", {"bad.yaml:3", "surface", "got '3'", "wanted a mapping"}},
-    {"ScalarForObjects", "task: {kind: grasp, target: a}", "task: grasp", {"bad.yaml:21", "task", "got 'grasp'", "wanted a mapping"}},
+    {"MappingForText",
+     "name: a\n",
+     "name: {a: b}\n",
+     {"bad.yaml:8", "objects[0].name", "got a mapping", "wanted text"}},
+    {"TwoNumbersForThree",
+     "[0.04, 0.04, 0.04]",
+     "[0.04, 0.04]",
+     {"bad.yaml:10", "objects[0].size", "got a list of 2", "wanted 3 numbers"}},
+    {"TextInList",
+     "[0.04, 0.04, 0.04]",
+     "[0.04, wide, 0.04]",
+     {"bad.yaml:10", "objects[0].size[1]", "got 'wide'", "wanted a number"}},
+    {"ScalarForMapping",
+     "surface: {kind: table, size: [0.6, 0.6]}",
+     "surface: 3",
+     {"bad.yaml:3", "surface", "got '3'", "wanted a mapping"}},
+    {"ScalarForObjects",
+     "task: {kind: grasp, target: a}",
+     "task: grasp",
+     {"bad.yaml:21", "task", "got 'grasp'", "wanted a mapping"}},
     {"UnknownTopKey", "name: two boxes", "nam: two boxes", {"bad.yaml:2", "nam", "unknown key", "name"}},
     {"UnknownObjectKey", "friction: 0.4", "frictoin: 0.4", {"bad.yaml:", "objects[0].friction", "missing"}},
-    {"ExtraObjectKey", "mass: 0.5", "mass: 0.5\n    colour: red", {"bad.yaml:12", "objects[0].colour", "unknown key", "wanted one of", "friction"}},
-    {"RadiusOfABox", "mass: 0.5", "mass: 0.5\n    radius: 0.1", {"bad.yaml:12", "objects[0].radius", "unknown key", "size"}},
-    {"UnknownPoseKey", "{x: 0.1, y: 0.1}", "{x: 0.1, y: 0.1, z: 0}", {"bad.yaml:20", "objects[1].pose.z", "unknown key", "yaw"}},
+    {"ExtraObjectKey",
+     "mass: 0.5",
+     "mass: 0.5\n    colour: red",
+     {"bad.yaml:12", "objects[0].colour", "unknown key", "wanted one of", "friction"}},
+    {"RadiusOfABox",
+     "mass: 0.5",
+     "mass: 0.5\n    radius: 0.1",
+     {"bad.yaml:12", "objects[0].radius", "unknown key", "size"}},
+    {"UnknownPoseKey",
+     "{x: 0.1, y: 0.1}",
+     "{x: 0.1, y: 0.1, z: 0}",
+     {"bad.yaml:20", "objects[1].pose.z", "unknown key", "yaw"}},
     {"TwiceTheSameKey", "mass: 0.5", "mass: 0.5\n    mass: 0.6", {"bad.yaml:12", "objects[0].mass", "twice"}},
-    {"UnknownShape", "shape: box", "shape: sphere", {"bad.yaml:9", "objects[0].shape", "got 'sphere'", "wanted one of: box, cylinder"}},
-    {"UnknownSurface", "kind: table", "kind: floor", {"bad.yaml:3", "surface.kind", "got 'floor'", "wanted one of: table, shelf"}},
-    {"UnknownRobot", "planar_gripper", "humanoid", {"bad.yaml:5", "robot.model", "got 'humanoid'", "wanted one of: planar_gripper"}},
-    {"UnknownTask", "kind: grasp", "kind: juggle", {"bad.yaml:21", "task.kind", "got 'juggle'", "wanted one of: grasp"}},
-    {"UnknownTarget", "target: a", "target: z", {"bad.yaml:21", "task.target", "got 'z'", "wanted the name of an object"}},
+    {"UnknownShape",
+     "shape: box",
+     "shape: sphere",
+     {"bad.yaml:9", "objects[0].shape", "got 'sphere'", "wanted one of: box, cylinder"}},
+    {"UnknownSurface",
+     "kind: table",
+     "kind: floor",
+     {"bad.yaml:3", "surface.kind", "got 'floor'", "wanted one of: table, shelf"}},
+    {"UnknownRobot",
+     "planar_gripper",
+     "humanoid",
+     {"bad.yaml:5", "robot.model", "got 'humanoid'", "wanted one of: planar_gripper"}},
+    {"UnknownTask",
+     "kind: grasp",
+     "kind: juggle",
+     {"bad.yaml:21", "task.kind", "got 'juggle'", "wanted one of: grasp"}},
+    {"UnknownTarget",
+     "target: a",
+     "target: z",
+     {"bad.yaml:21", "task.target", "got 'z'", "wanted the name of an object"}},
     {"NegativeMass", "mass: 0.5", "mass: -0.5", {"bad.yaml:11", "objects[0]", "mass", "got -0.5", "wanted"}},
     {"ZeroMass", "mass: 0.5", "mass: 0", {"bad.yaml:11", "objects[0]", "mass", "got 0", "wanted"}},
     {"InfiniteMass", "mass: 0.5", "mass: .inf", {"bad.yaml:11", "objects[0]", "mass", "got inf", "wanted"}},
-    {"NegativeFriction", "friction: 0.4", "friction: -1", {"bad.yaml:12", "objects[0]", "friction", "got -1", "wanted"}},
-    {"NaNPose", "{x: 0, y: 0, yaw: 0}", "{x: .nan, y: 0}", {"bad.yaml:13", "objects[0]", "pose.x", "got nan", "wanted"}},
-    {"NaNYaw", "{x: 0, y: 0, yaw: 0}", "{x: 0, y: 0, yaw: .nan}", {"bad.yaml:13", "objects[0]", "pose.yaw", "got nan", "wanted"}},
+    {"NegativeFriction",
+     "friction: 0.4",
+     "friction: -1",
+     {"bad.yaml:12", "objects[0]", "friction", "got -1", "wanted"}},
+    {"NaNPose",
+     "{x: 0, y: 0, yaw: 0}",
+     "{x: .nan, y: 0}",
+     {"bad.yaml:13", "objects[0]", "pose.x", "got nan", "wanted"}},
+    {"NaNYaw",
+     "{x: 0, y: 0, yaw: 0}",
+     "{x: 0, y: 0, yaw: .nan}",
+     {"bad.yaml:13", "objects[0]", "pose.yaw", "got nan", "wanted"}},
     {"NaNSurface", "[0.6, 0.6]", "[0.6, .nan]", {"bad.yaml:3", "surface.size[1]", "got nan", "wanted"}},
     {"NaNTimeStep", "time_step: 0.002", "time_step: .nan", {"bad.yaml:22", "physics.time_step", "got nan", "wanted"}},
     {"ZeroTimeStep", "time_step: 0.002", "time_step: 0", {"bad.yaml:22", "physics.time_step", "got 0", "wanted"}},
@@ -120,10 +191,19 @@ const std::vector<Case> kCases{
     {"TooWideOpen", "opening: 0.085", "opening: 0.2", {"bad.yaml:6", "robot.start.opening", "got 0.2", "wanted"}},
     {"EmptyName", "name: b", "name: ''", {"bad.yaml:14", "objects[1]", "name", "got ''", "wanted"}},
     {"DuplicateName", "name: b", "name: a", {"bad.yaml:14", "objects[1]", "'a'", "name", "taken", "unique"}},
-    {"OffTheTable", "{x: 0.1, y: 0.1}", "{x: 0.31, y: 0.1}", {"bad.yaml:20", "objects[1]", "'b'", "pose.x", "got 0.31", "wanted", "on the surface"}},
+    {"OffTheTable",
+     "{x: 0.1, y: 0.1}",
+     "{x: 0.31, y: 0.1}",
+     {"bad.yaml:20", "objects[1]", "'b'", "pose.x", "got 0.31", "wanted", "on the surface"}},
     // A box edge at x = 0.02 and a disc of radius 0.04 at 0.05: 10 mm deep.
-    {"InsideAnother", "{x: 0.1, y: 0.1}", "{x: 0.05, y: 0}", {"bad.yaml:20", "'b'", "inside object 'a'", "10.0 mm", "wanted a free place"}},
-    {"InsideTheRobot", "{x: 0.1, y: 0.1}", "{x: -0.299, y: 0}", {"bad.yaml:20", "'b'", "inside the robot", "wanted a free place"}},
+    {"InsideAnother",
+     "{x: 0.1, y: 0.1}",
+     "{x: 0.05, y: 0}",
+     {"bad.yaml:20", "'b'", "inside object 'a'", "10.0 mm", "wanted a free place"}},
+    {"InsideTheRobot",
+     "{x: 0.1, y: 0.1}",
+     "{x: -0.299, y: 0}",
+     {"bad.yaml:20", "'b'", "inside the robot", "wanted a free place"}},
 };
 
 INSTANTIATE_TEST_SUITE_P(EveryKind, MalformedScene, testing::ValuesIn(kCases),
@@ -178,11 +258,21 @@ std::string mutated(std::string text, std::mt19937& random) {
     const char byte = static_cast<char>(random() % 256);
     static constexpr std::string_view kSyntax = "{}[]:,-#&*!|>'\"%@`\n \t0.eE?~";
     switch (random() % 8) {
-      case 0: text[at] = byte; break;
-      case 1: text.insert(at, 1, kSyntax[random() % kSyntax.size()]); break;
-      case 2: text.erase(at, 1 + random() % 8); break;
-      case 3: text.insert(at, text.substr(random() % text.size(), random() % 20)); break;
-      case 4: text[at] = kSyntax[random() % kSyntax.size()]; break;
+      case 0:
+        text[at] = byte;
+        break;
+      case 1:
+        text.insert(at, 1, kSyntax[random() % kSyntax.size()]);
+        break;
+      case 2:
+        text.erase(at, 1 + random() % 8);
+        break;
+      case 3:
+        text.insert(at, text.substr(random() % text.size(), random() % 20));
+        break;
+      case 4:
+        text[at] = kSyntax[random() % kSyntax.size()];
+        break;
       default: {  // another digit, which often leaves a good scene
         const std::size_t digit = text.find_first_of("0123456789", at);
         if (digit != std::string::npos) text[digit] = static_cast<char>('0' + random() % 10);

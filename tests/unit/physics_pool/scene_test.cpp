@@ -62,7 +62,7 @@ TEST(SceneYaml, ReadsBackBitForBitOverGeneratedScenes) {
 
 TEST(SceneYaml, ReadsBackAwkwardNumbersBitForBit) {
   Scene scene = tests::target_only();
-  scene.objects[0].x = 0.1 + 0.2 - 0.3;           // 5.5e-17
+  scene.objects[0].x = 0.1 + 0.2 - 0.3;  // 5.5e-17
   scene.objects[0].y = -1e-300;
   scene.objects[0].yaw = std::numbers::pi;
   scene.objects[0].mass = std::nextafter(0.3, 1.0);
@@ -96,7 +96,8 @@ jostle_scene: 1
 objects:
   - {name: a, size: [0.04, 0.05, 0.06], mass: 0.5, friction: 0.4, pose: {x: 0.1, y: 0}}
 task: {target: a}
-)", "small.yaml");
+)",
+                                 "small.yaml");
   ASSERT_TRUE(scene) << scene.error().message;
   Scene wanted;
   wanted.objects = {{.name = "a", .size = {0.04, 0.05, 0.06}, .mass = 0.5, .friction = 0.4, .x = 0.1}};
@@ -202,8 +203,7 @@ TEST(Overlap, OfRectanglesFollowsTheirRotation) {
   const double reach = 0.02 + 0.04 / std::sqrt(2.0);
   EXPECT_TRUE(overlap(a, tests::box("b", reach - 1e-6, 0, std::numbers::pi / 4)));
   EXPECT_FALSE(overlap(a, tests::box("b", reach + 1e-6, 0, std::numbers::pi / 4)));
-  EXPECT_FALSE(overlap(a, tests::box("b", reach - 1e-6, 0, 0.0)) &&
-               !overlap(a, tests::box("b", 0.04 - 1e-6, 0, 0.0)));
+  EXPECT_FALSE(overlap(a, tests::box("b", reach - 1e-6, 0, 0.0)) && !overlap(a, tests::box("b", 0.04 - 1e-6, 0, 0.0)));
 }
 
 TEST(Overlap, OfADiscAndACornerIsRound) {
@@ -249,7 +249,7 @@ TEST(OverlapsRobot, LeavesTheSpaceBetweenTheFingersFree) {
 TEST(OverlapsRobot, TurnsWithTheRobot) {
   Scene scene = tests::target_only();
   scene.robot = {.x = 0, .y = 0, .rotation = std::numbers::pi / 2, .opening = 0.085};
-  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", 0, -0.25)));   // arm now along -y
+  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", 0, -0.25)));  // arm now along -y
   EXPECT_FALSE(overlaps_robot(scene, tests::box("b", -0.25, 0)));
   EXPECT_TRUE(overlaps_robot(scene, tests::box("b", 0.045, 0.04)));  // right finger at +x
 }

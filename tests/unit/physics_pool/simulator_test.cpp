@@ -34,9 +34,7 @@ Object object(const World& world, State& x, std::size_t i) {
   return {&x.q[static_cast<std::size_t>(slot.q)], &x.v[static_cast<std::size_t>(slot.v)]};
 }
 
-int steps(const World& world, double seconds) {
-  return static_cast<int>(std::lround(seconds / world.time_step()));
-}
+int steps(const World& world, double seconds) { return static_cast<int>(std::lround(seconds / world.time_step())); }
 
 class SimulatorTest : public testing::Test {
  protected:
@@ -45,9 +43,7 @@ class SimulatorTest : public testing::Test {
     sut = std::make_unique<Simulator>(world);
     x = initial_state(scene);
   }
-  Advance run(const std::vector<double>& u, double seconds) {
-    return sut->advance(x, u, steps(*world, seconds));
-  }
+  Advance run(const std::vector<double>& u, double seconds) { return sut->advance(x, u, steps(*world, seconds)); }
 
   WorldPtr world;
   std::unique_ptr<Simulator> sut;

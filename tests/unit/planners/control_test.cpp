@@ -45,8 +45,14 @@ class ControllerTest : public testing::Test {
   tests::KinematicRobot robot{x};
   tests::KinematicObjects objects{geometry.layout, x};
   tests::KinematicPlanner planner;
-  ControlSetup setup{.planner = planner, .robot = robot, .objects = objects, .geometry = geometry,
-                     .objective = {}, .world = hash_of("world"), .seed = 11, .make_feasible = {}};
+  ControlSetup setup{.planner = planner,
+                     .robot = robot,
+                     .objects = objects,
+                     .geometry = geometry,
+                     .objective = {},
+                     .world = hash_of("world"),
+                     .seed = 11,
+                     .make_feasible = {}};
   ControlOptions options;
   std::vector<Phase> phases;
 };
@@ -339,8 +345,7 @@ TEST_F(OnlineReplanning, BacksOffByAFingersLengthWhenThePlanDropsAnObject) {
   // and forward again, to where the hand would have gone
   State x1 = way_out.x0;
   for (int t = 0; t < way_out.initial.steps(); ++t) x1 = tests::moved(x1, way_out.initial.step(t), 1.0);
-  EXPECT_NEAR(physics_pool::target_bearing(geometry, x1).distance,
-              physics_pool::planar_gripper::kGraspDepth, 1e-12);
+  EXPECT_NEAR(physics_pool::target_bearing(geometry, x1).distance, physics_pool::planar_gripper::kGraspDepth, 1e-12);
 }
 
 TEST_F(OnlineReplanning, ReplansOnceTooFewControlsAreLeft) {

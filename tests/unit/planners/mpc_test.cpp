@@ -37,7 +37,9 @@ class MpcTest : public testing::Test {
     return result.error();
   }
 
-  double* object(State& state, int i) { return &state.q[static_cast<std::size_t>(geometry.layout.objects[std::size_t(i)].q)]; }
+  double* object(State& state, int i) {
+    return &state.q[static_cast<std::size_t>(geometry.layout.objects[std::size_t(i)].q)];
+  }
 
   // Puts object i at (px, py) once `at` actions are done.
   void put_after(int at, int i, double px, double py, double dz = 0.0) {
@@ -55,8 +57,14 @@ class MpcTest : public testing::Test {
   tests::KinematicRobot robot{x, kPusherJoints};
   tests::KinematicObjects objects{geometry.layout, x};
   tests::KinematicPlanner planner;
-  ControlSetup setup{.planner = planner, .robot = robot, .objects = objects, .geometry = geometry,
-                     .objective = {}, .world = hash_of("world"), .seed = 11, .make_feasible = {}};
+  ControlSetup setup{.planner = planner,
+                     .robot = robot,
+                     .objects = objects,
+                     .geometry = geometry,
+                     .objective = {},
+                     .world = hash_of("world"),
+                     .seed = 11,
+                     .make_feasible = {}};
   MpcOptions options;
   std::vector<Phase> phases;
 };
@@ -65,7 +73,8 @@ TEST_F(MpcTest, PlansFirstAroundTheStraightPush) {
   outcome();
   ASSERT_GE(planner.problems.size(), 1u);
   const Problem& first = planner.problems[0];
-  EXPECT_EQ(first.initial, straight_push(geometry, first.x0, options.horizon, options.step_duration, options.straight_speed));
+  EXPECT_EQ(first.initial,
+            straight_push(geometry, first.x0, options.horizon, options.step_duration, options.straight_speed));
   EXPECT_EQ(first.iterations, options.first_iterations);
   EXPECT_EQ(first.x0, initial_state(scene));
   EXPECT_EQ(first.world, hash_of("world"));
@@ -130,7 +139,8 @@ TEST_F(MpcTest, FillsUpPlansThatSucceedEarly) {
 
 TEST_F(MpcTest, TellsThePlannerWhatTheRobotIsDoing) {
   outcome();
-  for (std::size_t i = 1; i < planner.problems.size(); ++i) EXPECT_EQ(planner.problems[i].u_before, robot.executed[i - 1]);
+  for (std::size_t i = 1; i < planner.problems.size(); ++i)
+    EXPECT_EQ(planner.problems[i].u_before, robot.executed[i - 1]);
 }
 
 TEST_F(MpcTest, DrawsFreshNoiseForEveryPlan) {

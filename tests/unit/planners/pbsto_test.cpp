@@ -157,7 +157,9 @@ TEST_P(PbstoUpdate, SurvivesSamplesThatDiverge) {
 }
 
 TEST_P(PbstoUpdate, SurvivesAnInitialCandidateThatDiverges) {
-  pool.diverges = [](const auto& batch, std::uint32_t) { return batch.samples == 1 && batch.incumbent == kInfinity && batch.nominal.values[0] == 0; };
+  pool.diverges = [](const auto& batch, std::uint32_t) {
+    return batch.samples == 1 && batch.incumbent == kInfinity && batch.nominal.values[0] == 0;
+  };
   const Plan plan = planned(problem(20));
   EXPECT_LT(plan.cost, kInfinity);
   EXPECT_EQ(plan.states.size(), static_cast<std::size_t>(plan.controls.steps()) + 1);
@@ -251,8 +253,8 @@ TEST_F(PbstoTest, GreedySearchesAroundTheNewCandidate) {
 }
 
 // Eq. 5.8 by hand: U*[t] = U[t] + sum_k exp(-C_k[t]/lambda)·dU_k[t] / sum_k exp(-C_k[t]/lambda).
-ControlSequence eq_5_8(const BowlPool& pool, const Problem& p, const physics_pool::SamplingLaw& law,
-                       int rollouts, double lambda) {
+ControlSequence eq_5_8(const BowlPool& pool, const Problem& p, const physics_pool::SamplingLaw& law, int rollouts,
+                       double lambda) {
   ControlSequence mean = p.initial;
   for (int t = 0; t < p.initial.steps(); ++t) {
     for (int i = 0; i < p.initial.nu; ++i) {
@@ -366,7 +368,8 @@ TEST_F(PbstoTest, ScreensWithLongStepsAndChoosesWithTheFineModel) {
   EXPECT_EQ(fine.fidelity, (physics_pool::Fidelity{.freeze = true}));
   ASSERT_EQ(fine.law.draws.size(), 2u);
   std::vector<std::pair<double, std::uint32_t>> ranked;
-  for (std::uint32_t k = 0; k < 8; ++k) ranked.emplace_back(pool.cost(sample_controls(coarse.nominal, coarse.law, k)), k);
+  for (std::uint32_t k = 0; k < 8; ++k)
+    ranked.emplace_back(pool.cost(sample_controls(coarse.nominal, coarse.law, k)), k);
   std::ranges::sort(ranked);
   EXPECT_THAT(fine.law.draws, testing::UnorderedElementsAre(ranked[0].second, ranked[1].second));
 }
@@ -452,7 +455,8 @@ TEST_F(PbstoTest, DeniedSuccessThatIsStillBetterIsKeptAtItsTrueCost) {
   planned(problem(12));
   bool kept = false;
   for (std::size_t i = 1; i < news.size(); ++i) {
-    kept = kept || (!news[i].at_goal && news[i].cost > options.objective.success_cost && news[i].cost < news[i - 1].cost);
+    kept =
+        kept || (!news[i].at_goal && news[i].cost > options.objective.success_cost && news[i].cost < news[i - 1].cost);
   }
   EXPECT_TRUE(kept);
 }

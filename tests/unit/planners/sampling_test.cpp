@@ -227,8 +227,7 @@ std::string name_of(const testing::TestParamInfo<Method>& rule) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Rules, SamplingMethod,
-                         testing::Values(Method::kPredictive, Method::kMppi, Method::kCem, Method::kIcem),
-                         name_of);
+                         testing::Values(Method::kPredictive, Method::kMppi, Method::kCem, Method::kIcem), name_of);
 
 TEST_F(SamplingTest, PredictiveSearchesAroundTheCheapestSoFar) {
   (void)planned(problem(6));

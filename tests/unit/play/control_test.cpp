@@ -31,7 +31,8 @@ TEST(ParseControl, TakesWordsAndNumbers) {
 std::vector<KeyPress> pressed(std::string_view bytes) { return KeyDecoder().feed(bytes); }
 
 TEST(KeyDecoder, KnowsLettersAndArrows) {
-  EXPECT_THAT(pressed(" s+"), ElementsAre(KeyPress{Key::kSpace}, KeyPress{Key::kOther, 's'}, KeyPress{Key::kOther, '+'}));
+  EXPECT_THAT(pressed(" s+"),
+              ElementsAre(KeyPress{Key::kSpace}, KeyPress{Key::kOther, 's'}, KeyPress{Key::kOther, '+'}));
   EXPECT_THAT(pressed("\033[C\033[D\033OA\033[B"),
               ElementsAre(KeyPress{Key::kRight}, KeyPress{Key::kLeft}, KeyPress{Key::kUp}, KeyPress{Key::kDown}));
 }
@@ -61,7 +62,8 @@ class ControlTest : public ::testing::Test {
     const auto data = cdr_of("a");
     for (const bag::Time time : {0, 50}) taken(writer->write(0, {.log_time = time * 1'000'000'000, .data = data}));
     taken(writer->close());
-    sut = taken(Playback::create(taken(bag::BagReader::open(folder.path() / "bag")), {.paused = true, .topics = {0}}, sink));
+    sut = taken(
+        Playback::create(taken(bag::BagReader::open(folder.path() / "bag")), {.paused = true, .topics = {0}}, sink));
   }
 
   // Presses a key, and does what it means.
@@ -120,7 +122,12 @@ TEST_F(ControlTest, RefusesWhatItCannotDo) {
 }
 
 TEST(ProgressLine, ShowsBarTimeRateStateAndTheBusiestTopics) {
-  const Progress progress{.state = "playing", .time = 15.0, .start = 10.0, .end = 20.0, .rate = 0.5, .loop = true,
+  const Progress progress{.state = "playing",
+                          .time = 15.0,
+                          .start = 10.0,
+                          .end = 20.0,
+                          .rate = 0.5,
+                          .loop = true,
                           .topics = {{"/quiet", 0.0}, {"/slow", 10.0}, {"/fast", 100.0}}};
   EXPECT_EQ(progress_line(progress, 200),
             "[============>           ]  15.0/20.0 s  x0.5  playing  loop  110/s  /fast 100  /slow 10");

@@ -96,9 +96,7 @@ class Log : public Playback::Sink {
 class PlaybackTest : public ::testing::Test {
  protected:
   // a0 a1 a2 a3 at 0, 1, 2, 3 s; b0 at 0.5 s, b1 and b2 at 2 s.
-  PlaybackTest() {
-    write("bag", {{0, 0ms}, {1, 500ms}, {0, 1s}, {0, 2s}, {1, 2s}, {1, 2s}, {0, 3s}});
-  }
+  PlaybackTest() { write("bag", {{0, 0ms}, {1, 500ms}, {0, 1s}, {0, 2s}, {1, 2s}, {1, 2s}, {0, 3s}}); }
 
   void write(const std::string& name, const std::vector<std::pair<int, nanoseconds>>& messages) {
     auto writer = taken(bag::BagWriter::create(folder.path() / name, {}));
@@ -117,7 +115,9 @@ class PlaybackTest : public ::testing::Test {
     if (options.topics.empty()) options.topics = {0, 1};
     return Playback::create(taken(bag::BagReader::open(folder.path() / name)), std::move(options), log);
   }
-  void start(PlaybackOptions options = {}, const std::string& name = "bag") { sut = taken(create(std::move(options), name)); }
+  void start(PlaybackOptions options = {}, const std::string& name = "bag") {
+    sut = taken(create(std::move(options), name));
+  }
 
   // Lets the clock run to `time`, from event to event.
   void go(nanoseconds time) {
@@ -333,7 +333,9 @@ class Damaged : public bag::BagReader {
     if (count_++ == 2) return Error{Code::kInvalidArgument, "byte 77: damaged"};
     return whole_->next();
   }
-  Result<std::optional<bag::Message>> last_at(int topic, bag::Time time) override { return whole_->last_at(topic, time); }
+  Result<std::optional<bag::Message>> last_at(int topic, bag::Time time) override {
+    return whole_->last_at(topic, time);
+  }
 
  private:
   std::unique_ptr<bag::BagReader> whole_;

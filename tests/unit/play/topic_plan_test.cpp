@@ -25,16 +25,15 @@ bag::Topic typed(const std::string& name, const std::string& type, const dds::Qo
   return {.name = name, .type = type, .qos = qos};
 }
 
-const bag::BagInfo kRun = bag_of({typed("/joint_states", "sensor_msgs/msg/JointState", dds::kState),
-                                  typed("/lab/tf", "tf2_msgs/msg/TFMessage"),
-                                  typed("/map", "nav_msgs/msg/OccupancyGrid", dds::kLatched),
-                                  typed("/notes", "std_msgs/msg/String"),
-                                  typed("/play/status", "jostle_msgs/msg/PlayStatus", dds::kLatched),
-                                  typed("/pool/result", "jostle_msgs/msg/TaskResult"),
-                                  typed("/robot/command", "jostle_msgs/msg/VelocityCommand", dds::kCommand),
-                                  typed("/robot/status", "jostle_msgs/msg/RobotStatus", dds::kState),
-                                  typed("/task/goal", "jostle_msgs/msg/Goal", dds::kCommand),
-                                  typed("/task/plan", "jostle_msgs/msg/Plan", dds::kCommand)});
+const bag::BagInfo kRun =
+    bag_of({typed("/joint_states", "sensor_msgs/msg/JointState", dds::kState),
+            typed("/lab/tf", "tf2_msgs/msg/TFMessage"), typed("/map", "nav_msgs/msg/OccupancyGrid", dds::kLatched),
+            typed("/notes", "std_msgs/msg/String"), typed("/play/status", "jostle_msgs/msg/PlayStatus", dds::kLatched),
+            typed("/pool/result", "jostle_msgs/msg/TaskResult"),
+            typed("/robot/command", "jostle_msgs/msg/VelocityCommand", dds::kCommand),
+            typed("/robot/status", "jostle_msgs/msg/RobotStatus", dds::kState),
+            typed("/task/goal", "jostle_msgs/msg/Goal", dds::kCommand),
+            typed("/task/plan", "jostle_msgs/msg/Plan", dds::kCommand)});
 
 std::vector<std::string> names(const services::TopicPlan& plan) {
   std::vector<std::string> result;
@@ -54,15 +53,17 @@ TEST(TopicPlan, PlaysAllButCommandsAndItsOwn) {
 }
 
 TEST(TopicPlan, CommandsNeedTheirFullName) {
-  EXPECT_THAT(names(taken(plan_topics(kRun, {.selection = {.topics = {"/robot/*"}}}))), ElementsAre("/robot/status (state)"));
+  EXPECT_THAT(names(taken(plan_topics(kRun, {.selection = {.topics = {"/robot/*"}}}))),
+              ElementsAre("/robot/status (state)"));
   EXPECT_THAT(names(taken(plan_topics(kRun, {.selection = {.topics = {"/robot/*", "/robot/command"}}}))),
               ElementsAre("/robot/command", "/robot/status (state)"));
-  EXPECT_THAT(names(taken(plan_topics(kRun, {.selection = {.topics = {"/robot/*"}},
-                                             .remaps = {{"/robot/command", "/recorded/command"}}}))),
+  EXPECT_THAT(names(taken(plan_topics(
+                  kRun, {.selection = {.topics = {"/robot/*"}}, .remaps = {{"/robot/command", "/recorded/command"}}}))),
               ElementsAre("/recorded/command", "/robot/status (state)"));
   const auto none = plan_topics(kRun, {.selection = {.topics = {"/robot/comm*"}}});
   ASSERT_FALSE(none);
-  EXPECT_THAT(none.error().message, AllOf(HasSubstr("shelf: no topic to play"), HasSubstr("/robot/command commands somebody")));
+  EXPECT_THAT(none.error().message,
+              AllOf(HasSubstr("shelf: no topic to play"), HasSubstr("/robot/command commands somebody")));
 }
 
 TEST(TopicPlan, KnowsCommandsOfOthersByNameAndType) {
@@ -99,8 +100,8 @@ TEST(TopicPlan, RefusesWhatMakesNoSense) {
 }
 
 TEST(TopicPlan, LeavesTheClockToTheClockAndForeignTypesOut) {
-  const auto plan = taken(plan_topics(bag_of({typed("/clock", "rosgraph_msgs/msg/Clock"), typed("/n", "std_msgs/msg/String"),
-                                              typed("/ros1", "std_msgs/String")}),
+  const auto plan = taken(plan_topics(bag_of({typed("/clock", "rosgraph_msgs/msg/Clock"),
+                                              typed("/n", "std_msgs/msg/String"), typed("/ros1", "std_msgs/String")}),
                                       {.with_clock = true}));
   EXPECT_THAT(names(plan), ElementsAre("/n"));
   EXPECT_THAT(plan.impossible, ElementsAre(HasSubstr("--clock"), HasSubstr("std_msgs/String")));
@@ -108,7 +109,8 @@ TEST(TopicPlan, LeavesTheClockToTheClockAndForeignTypesOut) {
 
 TEST(ParseRemap, WantsTwoTopics) {
   EXPECT_EQ(taken(services::parse_remap("/a:=/b/c")), (std::pair<std::string, std::string>("/a", "/b/c")));
-  for (const char* text : {"", "/a", "/a:=", ":=/b", "a:=/b", "/a=/b", "/a:=/b/"}) EXPECT_FALSE(services::parse_remap(text)) << text;
+  for (const char* text : {"", "/a", "/a:=", ":=/b", "a:=/b", "/a=/b", "/a:=/b/"})
+    EXPECT_FALSE(services::parse_remap(text)) << text;
 }
 
 }  // namespace

@@ -16,8 +16,8 @@ using convert::to_wire;
 using ::testing::HasSubstr;
 
 // Doubles that lose something in anything but a copy of their bits.
-const std::vector<double> kAwkward{0.0, -0.0, 0.1, 1e-310, -kInfinity, kInfinity,
-                                   std::numeric_limits<double>::max(), 1.0 / 3.0};
+const std::vector<double> kAwkward{
+    0.0, -0.0, 0.1, 1e-310, -kInfinity, kInfinity, std::numeric_limits<double>::max(), 1.0 / 3.0};
 
 RolloutBatch odd_batch() {
   RolloutBatch batch;
@@ -26,15 +26,35 @@ RolloutBatch odd_batch() {
   batch.nominal = {.nu = 4, .values = kAwkward};
   batch.u_before = {1, 2, 3, -0.0};
   batch.step_duration = 0.7;
-  batch.law = {.sigma = {1, 2}, .limit = {3, 4}, .scales = {5, 6, 7}, .seed = UINT64_MAX - 1, .stream = 17,
-               .persistence = 0.3, .draws = {9, UINT32_MAX}};
+  batch.law = {.sigma = {1, 2},
+               .limit = {3, 4},
+               .scales = {5, 6, 7},
+               .seed = UINT64_MAX - 1,
+               .stream = 17,
+               .persistence = 0.3,
+               .draws = {9, UINT32_MAX}};
   batch.first_sample = UINT32_MAX - 5;
   batch.samples = 5;
-  batch.objective = {.goal = 1, .angle = 2, .acceleration = 3, .disturbance = 4,
-                     .disturbance_rotation = 5, .edge = 6, .edge_rate = 7, .edge_exponent_max = 8,
-                     .edge_margin = 9, .topple = 10, .topple_angle = 11, .drop = 12,
-                     .drop_height = 13, .obstruction = 15, .obstacle_target = 16, .obstacle_pusher = 17, .obstacle_nearest = 18,
-                     .collision = 20, .intrusion = 19, .success_cost = 14};
+  batch.objective = {.goal = 1,
+                     .angle = 2,
+                     .acceleration = 3,
+                     .disturbance = 4,
+                     .disturbance_rotation = 5,
+                     .edge = 6,
+                     .edge_rate = 7,
+                     .edge_exponent_max = 8,
+                     .edge_margin = 9,
+                     .topple = 10,
+                     .topple_angle = 11,
+                     .drop = 12,
+                     .drop_height = 13,
+                     .obstruction = 15,
+                     .obstacle_target = 16,
+                     .obstacle_pusher = 17,
+                     .obstacle_nearest = 18,
+                     .collision = 20,
+                     .intrusion = 19,
+                     .success_cost = 14};
   batch.incumbent = 0.1;
   batch.stop_losers = false;
   batch.stop_hopeless = true;

@@ -16,9 +16,15 @@ constexpr double kFar = 5000.0;  // s that the other machine's clock is ahead
 
 // Sent and received 1 ms before and after the sample ran, plus what is asked for.
 SampleTrace trace(const std::string& name, double from, double to, double ahead = 0.0, double delay = 0.0) {
-  return {.client = 1, .worker = std::hash<std::string>()(name), .epoch = 7, .worker_name = name,
-          .sent = from - 0.001 - delay, .received = to + 0.001 + delay,
-          .arrived = from + ahead, .started = from + ahead, .finished = to + ahead};
+  return {.client = 1,
+          .worker = std::hash<std::string>()(name),
+          .epoch = 7,
+          .worker_name = name,
+          .sent = from - 0.001 - delay,
+          .received = to + 0.001 + delay,
+          .arrived = from + ahead,
+          .started = from + ahead,
+          .finished = to + ahead};
 }
 
 TEST(ClockOffset, IsExactWhereTheLeastDelaysAreEqual) {
@@ -78,8 +84,7 @@ TEST(Timeline, BusyTimeAndGaps) {
   // 0 to 10.002 s: a is busy for 3 + 4 s with 2 s in between and 1 s at the end, b never.
   SampleTrace last = trace("a", 5, 9);
   last.received = 10.001;
-  const Timeline sut = timeline_of({last, trace("a", 0, 3)},
-                                   {{.name = "a"}, {.name = "b", .capacity = 1}});
+  const Timeline sut = timeline_of({last, trace("a", 0, 3)}, {{.name = "a"}, {.name = "b", .capacity = 1}});
   ASSERT_THAT(sut.rows, SizeIs(2));
   EXPECT_NEAR(sut.length, 10.002, 1e-9);
   EXPECT_NEAR(sut.rows[0].busy, 7.0, 1e-9);

@@ -27,7 +27,8 @@ struct Load {
 
 class TurnsTest : public ::testing::Test {
  protected:
-  void wait(std::uint64_t client, std::uint32_t sample, Priority priority = Priority::kNormal, std::uint64_t epoch = 1) {
+  void wait(std::uint64_t client, std::uint32_t sample, Priority priority = Priority::kNormal,
+            std::uint64_t epoch = 1) {
     sut.wait({.client = client, .epoch = epoch, .sample = sample, .priority = priority});
   }
 
@@ -42,9 +43,7 @@ class TurnsTest : public ::testing::Test {
   std::map<std::uint64_t, double> share(const std::vector<Load>& loads, int threads, double time) {
     std::map<std::uint64_t, double> used;
     std::map<double, std::pair<Job, double>> running;  // by end
-    const auto of = [&](std::uint64_t client) {
-      return *std::ranges::find(loads, client, &Load::client);
-    };
+    const auto of = [&](std::uint64_t client) { return *std::ranges::find(loads, client, &Load::client); };
     for (const Load& load : loads) {
       for (int i = 0; i < load.depth; ++i) wait(load.client, 0, load.priority);
     }
@@ -90,7 +89,8 @@ TEST_F(TurnsTest, LongAndShortSamplesGetHalfOfTheTimeEach) {
   for (const int threads : {1, 2, 5}) {
     sut = {};
     auto used = share({{.client = kAnna, .length = 0.060, .depth = threads + 1},
-                       {.client = kBert, .length = 0.005, .depth = threads + 1}}, threads, 20.0);
+                       {.client = kBert, .length = 0.005, .depth = threads + 1}},
+                      threads, 20.0);
     EXPECT_NEAR(used[kAnna] / (used[kAnna] + used[kBert]), 0.5, 0.02) << threads << " threads";
   }
 }
@@ -98,21 +98,24 @@ TEST_F(TurnsTest, LongAndShortSamplesGetHalfOfTheTimeEach) {
 TEST_F(TurnsTest, ThreeClientsGetAThirdEachHoweverMuchTheyAskFor) {
   auto used = share({{.client = kAnna, .length = 0.060, .depth = 50},
                      {.client = kBert, .length = 0.005, .depth = 3},
-                     {.client = kCora, .length = 0.013, .depth = 3}}, 2, 30.0);
+                     {.client = kCora, .length = 0.013, .depth = 3}},
+                    2, 30.0);
   const double sum = used[kAnna] + used[kBert] + used[kCora];
   for (const std::uint64_t client : {kAnna, kBert, kCora}) EXPECT_NEAR(used[client] / sum, 1.0 / 3, 0.02) << client;
 }
 
 TEST_F(TurnsTest, UrgentRunsFirstAndNormalGetsAnEighth) {
   auto used = share({{.client = kAnna, .length = 0.020, .depth = 50},
-                     {.client = kBert, .length = 0.010, .priority = Priority::kUrgent}}, 1, 20.0);
+                     {.client = kBert, .length = 0.010, .priority = Priority::kUrgent}},
+                    1, 20.0);
   EXPECT_NEAR(used[kAnna] / (used[kAnna] + used[kBert]), 1.0 / 8, 0.01);
 }
 
 TEST_F(TurnsTest, PrioritiesShareWhateverTheNumberOfClients) {
   auto used = share({{.client = kAnna, .length = 0.020, .depth = 5},
                      {.client = kCora, .length = 0.007, .depth = 5},
-                     {.client = kBert, .length = 0.010, .priority = Priority::kUrgent}}, 1, 20.0);
+                     {.client = kBert, .length = 0.010, .priority = Priority::kUrgent}},
+                    1, 20.0);
   const double sum = used[kAnna] + used[kBert] + used[kCora];
   EXPECT_NEAR(used[kBert] / sum, 7.0 / 8, 0.01);
   EXPECT_NEAR(used[kAnna] / sum, 1.0 / 16, 0.01);
@@ -138,8 +141,8 @@ TEST_F(TurnsTest, WhoWasAwaySavedNothingUp) {
 
 TEST_F(TurnsTest, AMomentWithoutSamplesCostsNothing) {
   // Bert has one sample here at a time: between two of them he is not waiting.
-  auto used = share({{.client = kAnna, .length = 0.060, .depth = 2},
-                     {.client = kBert, .length = 0.060, .depth = 1}}, 1, 20.0);
+  auto used =
+      share({{.client = kAnna, .length = 0.060, .depth = 2}, {.client = kBert, .length = 0.060, .depth = 1}}, 1, 20.0);
   EXPECT_NEAR(used[kBert] / (used[kAnna] + used[kBert]), 0.5, 0.02);
 }
 
@@ -163,8 +166,10 @@ TEST_F(TurnsTest, SkippedSamplesCostTheirClientNothing) {
   int anna = 0;
   for (int i = 0; i < 10; ++i) {
     const auto job = sut.next();
-    if (job->client == kAnna) ++anna, sut.done(*job, Turns::Duration(0.0), true);
-    else sut.done(*job, Turns::Duration(1.0));
+    if (job->client == kAnna)
+      ++anna, sut.done(*job, Turns::Duration(0.0), true);
+    else
+      sut.done(*job, Turns::Duration(1.0));
   }
   EXPECT_GE(anna, 8);
 }

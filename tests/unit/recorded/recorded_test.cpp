@@ -25,8 +25,10 @@ StateLayout layout() {
 }
 
 Seen seen_at(double x, double angle = 0.0) {
-  return {.robot = {.q = {x, 0.0}, .v = {0.0, 0.0}},
-          .objects = {{.name = "can", .position = {x + 1, 0, 0}, .orientation = {std::cos(angle / 2), 0, 0, std::sin(angle / 2)}}}};
+  return {
+      .robot = {.q = {x, 0.0}, .v = {0.0, 0.0}},
+      .objects = {
+          {.name = "can", .position = {x + 1, 0, 0}, .orientation = {std::cos(angle / 2), 0, 0, std::sin(angle / 2)}}}};
 }
 
 class Recorded : public testing::Test {
@@ -54,7 +56,8 @@ class Recorded : public testing::Test {
     write("/task/observation", "jostle_msgs/msg/Observation", time, message);
   }
 
-  void plan(const std::string& goal, std::uint32_t number, std::uint32_t observation, bag::Time time, double world = 0.0) {
+  void plan(const std::string& goal, std::uint32_t number, std::uint32_t observation, bag::Time time,
+            double world = 0.0) {
     jostle_msgs::msg::Plan message;
     message.header(make_header(world));
     message.goal_id(goal);
@@ -91,7 +94,8 @@ class Recorded : public testing::Test {
 };
 
 TEST_F(Recorded, RunsComeInTheOrderTheyWereTakenUp) {
-  begin("second-name", kSecond), observe("second-name", 0, 2 * kSecond, 0, seen_at(0)), plan("second-name", 0, 0, 3 * kSecond);
+  begin("second-name", kSecond), observe("second-name", 0, 2 * kSecond, 0, seen_at(0)),
+      plan("second-name", 0, 0, 3 * kSecond);
   end("second-name", "target grasped", 4 * kSecond);
   begin("a-name", 5 * kSecond), observe("a-name", 0, 6 * kSecond, 0, seen_at(0));
 
@@ -194,7 +198,8 @@ TEST_F(Recorded, AStateThatDoesNotFitTheSceneIsNamed) {
   const RecordedRun run = read_runs(*source)->front();
   StateLayout other = layout();
   other.objects[0].name = "bottle";
-  EXPECT_THAT(RecordedMotion::read(*source, run, other, RunClock::kWorld).error().message, HasSubstr("no measurement of 'bottle'"));
+  EXPECT_THAT(RecordedMotion::read(*source, run, other, RunClock::kWorld).error().message,
+              HasSubstr("no measurement of 'bottle'"));
 }
 
 }  // namespace

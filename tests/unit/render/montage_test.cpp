@@ -48,9 +48,7 @@ TEST(Montage, WritesCaptionsDarkOnWhiteBelowThePicture) {
   EXPECT_LT(*std::min_element(strip, captioned->rgb.end()), 80);
 }
 
-TEST(Montage, RefusesNoPictures) {
-  EXPECT_FALSE(montage({}, {}, 1));
-}
+TEST(Montage, RefusesNoPictures) { EXPECT_FALSE(montage({}, {}, 1)); }
 
 TEST(Montage, RefusesCaptionsThatDoNotMatch) {
   const std::vector<std::string> captions(1);

@@ -30,8 +30,10 @@ class Replay : public testing::Test {
     goal.goal_id("grasp");
     goal.execution_scene(physics_pool::to_yaml(scene));
     goal.planning_scene(physics_pool::to_yaml(physics_pool::perturb(scene, physics_pool::Uncertainty::kLow, kSeed)));
-    goal.parameters("planner: {rollouts: 2}\nobjective: {success_cost: 1.0e-9}\n"
-                    "control: {many_iterations: 4, few_iterations: 2, few_iterations_max: 2, deviation_threshold: 0, timeout: 60}\n");
+    goal.parameters(
+        "planner: {rollouts: 2}\nobjective: {success_cost: 1.0e-9}\n"
+        "control: {many_iterations: 4, few_iterations: 2, few_iterations_max: 2, deviation_threshold: 0, timeout: "
+        "60}\n");
     goal.controller("or");
     goal.predictor("fine");
     goal.seed(kSeed);
@@ -64,12 +66,14 @@ class Replay : public testing::Test {
     physics_pool::ExecutionWorld execution(world, 0.0, kSeed);
     SimulatedRobot robot(execution);
     SimulatedObjects objects(execution, task.execution_scene());
-    const Task::Watch watch{.journal = {.on_observation = [&](const auto& seen) {
-                                          recorded.observations.push_back(seen);
-                                          recorded.observed.push_back(static_cast<bag::Time>(recorded.observed.size()) * 20'000'000);
-                                        },
-                                        .on_plan = [&](const auto& plan) { recorded.plans.push_back(plan); }},
-                            .time = [&] { return execution.time(); }};
+    const Task::Watch watch{
+        .journal = {.on_observation =
+                        [&](const auto& seen) {
+                          recorded.observations.push_back(seen);
+                          recorded.observed.push_back(static_cast<bag::Time>(recorded.observed.size()) * 20'000'000);
+                        },
+                    .on_plan = [&](const auto& plan) { recorded.plans.push_back(plan); }},
+        .time = [&] { return execution.time(); }};
     const auto outcome_result = task.perform(robot, objects, watch, {});
     if (!outcome_result) throw std::runtime_error(outcome_result.error().message);
     recorded.result.emplace();
@@ -178,8 +182,9 @@ TEST_F(Replay, ARunThatWasInterruptedIsEqualAsFarAsItGoes) {
 TEST_F(Replay, RefusesSettingsThatMakeNoSense) {
   const RecordedRun recorded = record(push());
   for (const auto& [setting, complaint] :
-       {std::pair{"rollouts", "KEY=VALUE"}, std::pair{"planner.rolouts=3", "rolouts"}, std::pair{"seed=many", "whole number"},
-        std::pair{"controller=or", "wanted mpc"}, std::pair{"planner.rollouts=[", "a value as in a file"}}) {
+       {std::pair{"rollouts", "KEY=VALUE"}, std::pair{"planner.rolouts=3", "rolouts"},
+        std::pair{"seed=many", "whole number"}, std::pair{"controller=or", "wanted mpc"},
+        std::pair{"planner.rollouts=[", "a value as in a file"}}) {
     SCOPED_TRACE(setting);
     const auto report_result = replay(recorded, {.settings = {setting}}, pool);
     ASSERT_FALSE(report_result);

@@ -61,7 +61,8 @@ TEST_F(IdentityFolder, AsIssuedSaysWhoMayDoWhatUntilWhen) {
   EXPECT_EQ(sut->name, "helper");
   EXPECT_EQ(sut->subject, "CN=helper,OU=worker,O=Jostle");
   EXPECT_EQ(sut->role, Role::kWorker);
-  EXPECT_THAT(sut->rights.publish, ElementsAre("rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"));
+  EXPECT_THAT(sut->rights.publish,
+              ElementsAre("rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"));
   EXPECT_THAT(sut->rights.subscribe, ElementsAre("rt/pool/*", "rt/doctor/*"));
   const auto left = sut->not_after - std::chrono::system_clock::now();
   EXPECT_LE(left, 30 * 24h);
@@ -136,7 +137,8 @@ TEST_F(IdentityFolder, WithAFileThatCannotBeReadIsRefusedNamingTheFile) {
 TEST_F(IdentityFolder, WithATruncatedOrEmptyOrForeignFileIsRefusedNamingTheFile) {
   for (const char* name : {"ca.pem", "cert.pem", "key.pem", "crl.pem", "governance.p7s", "permissions.p7s"}) {
     const std::string whole = tests::contents(arm / name);
-    for (const std::string& spoilt : {whole.substr(0, whole.size() / 2), std::string(), std::string("fruit: apple\n")}) {
+    for (const std::string& spoilt :
+         {whole.substr(0, whole.size() / 2), std::string(), std::string("fruit: apple\n")}) {
       tests::overwrite(arm / name, spoilt);
       expect_refused(arm, {(arm / name).string() + ": got " + std::to_string(spoilt.size()) + " bytes", "wanted",
                            "copy the whole folder"});
@@ -220,7 +222,8 @@ TEST_F(IdentityFolder, WithAnotherAuthoritysRevocationListIsRefused) {
 TEST_F(IdentityFolder, WithAnotherIdentitysKeyIsRefused) {
   fs::copy_file(helper / "key.pem", arm / "key.pem", fs::copy_options::overwrite_existing);
 
-  expect_refused(arm, {"key.pem: got another certificate's key", "wanted the key of cert.pem, 'CN=arm,OU=robot,O=Jostle'"});
+  expect_refused(arm,
+                 {"key.pem: got another certificate's key", "wanted the key of cert.pem, 'CN=arm,OU=robot,O=Jostle'"});
 }
 
 TEST_F(IdentityFolder, WithTextsOfAnotherAuthorityIsRefusedNamingBoth) {
@@ -240,7 +243,8 @@ TEST_F(IdentityFolder, WithTextsChangedAfterSigningIsRefused) {
   ASSERT_NE(place, std::string::npos);
   tests::overwrite(helper / "permissions.p7s", text.replace(place, 14, "rt/robot/comma"));
 
-  expect_refused(helper, {"permissions.p7s: got a text that its signature does not fit", "as '" + lab_name + "' signed it"});
+  expect_refused(helper,
+                 {"permissions.p7s: got a text that its signature does not fit", "as '" + lab_name + "' signed it"});
 }
 
 // Fast DDS takes permissions that any certificate below the CA signed, if it is
@@ -256,7 +260,8 @@ TEST_F(IdentityFolder, WithPermissionsItSignedItselfIsRefused) {
   const auto verifies = [&](const std::string& signed_text) {
     const std::unique_ptr<X509_STORE, FreedBy<X509_STORE_free>> store(X509_STORE_new());
     X509_STORE_add_cert(store.get(), lab.authority().certificate.get());
-    const std::unique_ptr<BIO, FreedBy<BIO_free_all>> in(BIO_new_mem_buf(signed_text.data(), static_cast<int>(signed_text.size())));
+    const std::unique_ptr<BIO, FreedBy<BIO_free_all>> in(
+        BIO_new_mem_buf(signed_text.data(), static_cast<int>(signed_text.size())));
     BIO* clear = nullptr;
     const std::unique_ptr<PKCS7, FreedBy<PKCS7_free>> p7(SMIME_read_PKCS7(in.get(), &clear));
     const std::unique_ptr<BIO, FreedBy<BIO_free_all>> content(clear), out(BIO_new(BIO_s_mem()));

@@ -112,12 +112,14 @@ TEST_F(Keystore, ListsNameRoleEndAndState) {
 
   const auto entries = tests::sure(list(keys));
 
-  ASSERT_THAT(entries, ElementsAre(Field(&Entry::name, "arm"), Field(&Entry::name, "old"), Field(&Entry::name, "lost")));
+  ASSERT_THAT(entries,
+              ElementsAre(Field(&Entry::name, "arm"), Field(&Entry::name, "old"), Field(&Entry::name, "lost")));
   EXPECT_THAT(entries, ElementsAre(Field(&Entry::role, Role::kRobot), Field(&Entry::role, Role::kObserver),
                                    Field(&Entry::role, Role::kWorker)));
   EXPECT_THAT(entries, ElementsAre(Field(&Entry::state, State::kValid), Field(&Entry::state, State::kExpired),
                                    Field(&Entry::state, State::kRevoked)));
-  EXPECT_EQ(entries[0].serial, security::serial_of(*tests::sure(security::load_certificate(keys / "identities/arm/cert.pem"))));
+  EXPECT_EQ(entries[0].serial,
+            security::serial_of(*tests::sure(security::load_certificate(keys / "identities/arm/cert.pem"))));
   const auto later = std::chrono::system_clock::now() + std::chrono::days(8);
   EXPECT_EQ(tests::sure(list(keys, later))[0].state, State::kExpired);
 }
@@ -128,13 +130,15 @@ TEST_F(Keystore, RevocationReachesEveryIdentityFolder) {
 
   const auto files = tests::sure(revoke(keys, "lost"));
 
-  EXPECT_THAT(files, UnorderedElementsAre(keys / "ca/crl.pem", keys / "identities/arm/crl.pem", keys / "identities/lost/crl.pem"));
+  EXPECT_THAT(files, UnorderedElementsAre(keys / "ca/crl.pem", keys / "identities/arm/crl.pem",
+                                          keys / "identities/lost/crl.pem"));
   const std::string list = tests::contents(files[0]);
   for (const fs::path& file : files) EXPECT_EQ(tests::contents(file), list);
   const fs::path later = tests::sure(issue(keys, "later", Role::kRobot, std::chrono::days(7)));
   X509_REVOKED* entry = nullptr;
   EXPECT_EQ(X509_CRL_get0_by_cert(tests::sure(security::load_revocation_list(later / "crl.pem")).get(), &entry,
-                                  tests::sure(security::load_certificate(keys / "identities/lost/cert.pem")).get()), 1);
+                                  tests::sure(security::load_certificate(keys / "identities/lost/cert.pem")).get()),
+            1);
 }
 
 TEST_F(Keystore, RevokingWhatWasNeverIssuedIsRefusedNamingWhatWas) {
@@ -149,9 +153,8 @@ TEST_F(Keystore, IssuesSideBySideWithoutForgettingOne) {
   {
     std::vector<std::jthread> threads;
     for (int i = 0; i < 8; ++i) {
-      threads.emplace_back([&, i] {
-        EXPECT_TRUE(issue(keys, "arm" + std::to_string(i), Role::kRobot, std::chrono::days(1)));
-      });
+      threads.emplace_back(
+          [&, i] { EXPECT_TRUE(issue(keys, "arm" + std::to_string(i), Role::kRobot, std::chrono::days(1))); });
     }
   }
   EXPECT_THAT(tests::sure(list(keys)), SizeIs(8));
@@ -169,16 +172,17 @@ TEST_F(Keystore, LeavesNoHalfMadeIdentityBehind) {
 
 // As Fast DDS matches topics: fnmatch without FNM_PATHNAME.
 bool matches(const std::vector<std::string>& patterns, const std::string& topic) {
-  return std::ranges::any_of(patterns, [&](const std::string& pattern) {
-    return fnmatch(pattern.c_str(), topic.c_str(), FNM_NOESCAPE) == 0;
-  });
+  return std::ranges::any_of(
+      patterns, [&](const std::string& pattern) { return fnmatch(pattern.c_str(), topic.c_str(), FNM_NOESCAPE) == 0; });
 }
 
 TEST(Roles, LetAWorkerSayResultsAndNothingToARobot) {
   const security::Rights worker = security::rights_of(Role::kWorker);
-  for (const char* topic : {"rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"}) EXPECT_TRUE(matches(worker.publish, topic)) << topic;
-  for (const char* topic : {"rt/robot/command", "rt/x/robot/command", "rt/pool/robot/command", "rt/pool/task/w1",
-                            "rt/pool/world", "rt/pool/control", "rt/task/goal", "rt/tf", "rt/x/pool/result", "rt/x/doctor/back"}) {
+  for (const char* topic : {"rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"})
+    EXPECT_TRUE(matches(worker.publish, topic)) << topic;
+  for (const char* topic :
+       {"rt/robot/command", "rt/x/robot/command", "rt/pool/robot/command", "rt/pool/task/w1", "rt/pool/world",
+        "rt/pool/control", "rt/task/goal", "rt/tf", "rt/x/pool/result", "rt/x/doctor/back"}) {
     EXPECT_FALSE(matches(worker.publish, topic)) << topic;
   }
   for (const char* topic : {"rt/pool/world", "rt/pool/control", "rt/pool/task/w0123456789abcdef"}) {

@@ -102,7 +102,9 @@ TEST(ProgressLine, ShowsTheBeginningAndTheEndOfQuickWork) {
     ProgressLine sut({.doing = "testing", .unit = "steps", .plain = PlainLines::kElsewhere});
     for (std::uint64_t done = 0; done <= 5000; ++done) sut.show(done, 5000);
   }
-  EXPECT_THAT(error.text(), MatchesRegex("testing: 0 of 5000 steps \\(0 %\\)\ntesting: 5000 of 5000 steps \\(100 %\\), .* per second\n"));
+  EXPECT_THAT(
+      error.text(),
+      MatchesRegex("testing: 0 of 5000 steps \\(0 %\\)\ntesting: 5000 of 5000 steps \\(100 %\\), .* per second\n"));
 }
 
 TEST(ProgressLine, IsWipedAtTheEndIfSoAsked) {

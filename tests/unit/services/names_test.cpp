@@ -32,8 +32,11 @@ TEST_P(BadNamespace, IsRefusedWithGotAndWanted) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, BadNamespace,
-                         ::testing::Values("/", "left/", "//left", "lab//left", "1left", "lab/1", "le ft", "left-arm", "l\xc3\xa4" "b",
-                                           "two__underscores", "a\nb", "~left", "{node}", "*", "pool", "/pool/x", "doctor",
+                         ::testing::Values("/", "left/", "//left", "lab//left", "1left", "lab/1", "le ft", "left-arm",
+                                           "l\xc3\xa4"
+                                           "b",
+                                           "two__underscores", "a\nb", "~left", "{node}", "*", "pool", "/pool/x",
+                                           "doctor",
                                            "a23456789012345678901234567890123456789012345678901234567890abcde"));
 
 }  // namespace

@@ -23,9 +23,7 @@ class FitTest : public testing::Test {
     data_ = std::move(read_transitions(folder.path() / "a")).value();
   }
 
-  void SetUp() override {
-    ASSERT_TRUE(can_fit()) << "built without libtorch";
-  }
+  void SetUp() override { ASSERT_TRUE(can_fit()) << "built without libtorch"; }
 
   static inline TransitionFile data_;
 };
@@ -60,8 +58,8 @@ TEST_F(FitTest, ForwardPassIsLibtorchs) {
 
 TEST_F(FitTest, StopsWhenItIsTold) {
   std::stop_source stop;
-  const auto sut = fit(data_, {.epochs = 1000, .threads = 1}, stop.get_token(),
-                       [&](const FitProgress&) { stop.request_stop(); });
+  const auto sut =
+      fit(data_, {.epochs = 1000, .threads = 1}, stop.get_token(), [&](const FitProgress&) { stop.request_stop(); });
   EXPECT_TRUE(sut) << "the best so far";
   const auto at_once = fit(data_, {.epochs = 1000, .threads = 1}, stop.get_token());
   ASSERT_FALSE(at_once);

@@ -74,6 +74,9 @@ std::string divergence(const mjModel& model, const mjData& data) {
   return finite ? "" : "non-finite state";
 }
 
+void ModelDeleter::operator()(mjModel* model) const { mj_deleteModel(model); }
+void DataDeleter::operator()(mjData* data) const { mj_deleteData(data); }
+
 const char* engine_version() { return mj_versionString(); }
 
 }  // namespace jostle::physics_pool

@@ -5,10 +5,11 @@
 
 #include <mujoco/mujoco.h>
 
-#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
+
+#include "physics_pool/local/handles.hpp"
 
 namespace jostle::physics_pool {
 
@@ -22,18 +23,6 @@ class EngineError : public std::runtime_error {
 
 /// Installs the error, warning and contact handlers; safe to call repeatedly.
 void install_engine_handlers();
-
-/// Of the MuJoCo library that is loaded, such as "2.2.2".
-const char* engine_version();
-
-struct ModelDeleter {
-  void operator()(mjModel* model) const { mj_deleteModel(model); }
-};
-struct DataDeleter {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-using ModelPtr = std::unique_ptr<mjModel, ModelDeleter>;
-using DataPtr = std::unique_ptr<mjData, DataDeleter>;
 
 /// Sets the drives to u [nu], m/s and rad/s; of a gripper's opening each finger takes
 /// half.

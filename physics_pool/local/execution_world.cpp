@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "physics_pool/local/engine.hpp"
 #include "physics_pool/sampling/counter_rng.hpp"
 
 namespace jostle::physics_pool {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "physics_pool/local/engine.hpp"
+
 namespace jostle::physics_pool {
 namespace {
 

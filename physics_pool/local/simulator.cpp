@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "physics_pool/local/engine.hpp"
+
 namespace jostle::physics_pool {
 
 Simulator::Simulator(WorldPtr world) : world_(std::move(world)), data_(mj_makeData(world_->model())) {}

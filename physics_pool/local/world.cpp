@@ -5,6 +5,7 @@
 #include <cstring>
 #include <mutex>
 
+#include "physics_pool/local/engine.hpp"
 #include "physics_pool/local/model_xml.hpp"
 
 namespace jostle::physics_pool {

@@ -8,7 +8,7 @@
 
 #include "idl/types/hash.hpp"
 #include "idl/types/result.hpp"
-#include "physics_pool/local/engine.hpp"
+#include "physics_pool/local/handles.hpp"
 #include "physics_pool/objective/terms.hpp"
 #include "physics_pool/scene/scene.hpp"
 
@@ -30,13 +30,13 @@ class World {
   const Scene& scene() const { return scene_; }
   const Hash& hash() const { return hash_; }
   const TaskGeometry& geometry() const { return geometry_; }
-  const mjModel* model() const { return model_.get(); }
+  const mjModel_* model() const { return model_.get(); }
   double time_step() const { return scene_.physics.time_step; }
 
   /// The same world in which only the first `free` objects can move (see
   /// ModelContent). Compiled when first asked for, once for all threads.
   /// Threads  safe from any thread. Throws EngineError.
-  const mjModel* reduced_model(int free) const;
+  const mjModel_* reduced_model(int free) const;
 
  private:
   World(const Scene& scene, ModelPtr model);

@@ -145,6 +145,11 @@ bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap) {
                              [&](const Footprint& part) { return footprint_gap(part, body) < gap; });
 }
 
+bool is_free(const Scene& scene, const SceneObject& object, double gap) {
+  return !overlaps_robot(scene, object, gap) &&
+         std::ranges::none_of(scene.objects, [&](const SceneObject& other) { return overlap(object, other, gap); });
+}
+
 Result<void> validate(const Scene& scene, const std::string& origin) {
   return validate(scene, [&](std::string_view) { return origin; });
 }

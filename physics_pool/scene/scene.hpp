@@ -130,6 +130,9 @@ bool overlap(const SceneObject& a, const SceneObject& b, double gap = 0.0);
 /// Whether an object is inside the robot's start pose, or closer than `gap` metres.
 bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap = 0.0);
 
+/// Whether an object would find its place free: nothing of the scene is nearer than `gap` metres.
+bool is_free(const Scene& scene, const SceneObject& object, double gap);
+
 /// Parts of a State for this scene, and the state at its start: at rest.
 StateLayout layout_of(const Scene& scene);
 State initial_state(const Scene& scene);

@@ -5,8 +5,8 @@
 #include <iterator>
 #include <sstream>
 
+#include "idl/text/yaml_fields.hpp"
 #include "physics_pool/scene/scene.hpp"
-#include "physics_pool/scene/yaml_fields.hpp"
 
 namespace jostle::physics_pool {
 namespace {

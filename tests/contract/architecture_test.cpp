@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <regex>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,10 +23,13 @@ bool starts_with_any(std::string_view text, std::initializer_list<std::string_vi
   return std::ranges::any_of(prefixes, [&](std::string_view prefix) { return text.starts_with(prefix); });
 }
 
-// Middleware headers and what fastddsgen makes of idl/msg.
-bool is_dds(std::string_view include) {
-  return starts_with_any(include, {"fastdds/", "fastrtps/", "fastcdr/", "idl/msg/"}) ||
-         include.find("_msgs/") != std::string_view::npos || include.find("PubSubTypes") != std::string_view::npos;
+// Middleware headers.
+bool is_dds(std::string_view include) { return starts_with_any(include, {"fastdds/", "fastrtps/", "fastcdr/"}); }
+
+// What fastddsgen makes of idl/msg.
+bool is_wire_type(std::string_view include) {
+  return include.starts_with("idl/msg/") || include.find("_msgs/") != std::string_view::npos ||
+         include.find("PubSubTypes") != std::string_view::npos;
 }
 
 bool is_engine(std::string_view include) { return starts_with_any(include, {"mujoco"}); }
@@ -36,53 +41,76 @@ bool is_ours(std::string_view include) {
   return std::ranges::any_of(kRooms, [&](std::string_view room) { return include.starts_with(room); });
 }
 
+// Who may include what, beside itself. The first row that a path begins with is the row of its room.
+struct Room {
+  std::string_view path;
+  std::vector<std::string_view> may_include;
+};
+
+const std::vector<Room> kArrows{
+    {"idl/types/", {}},
+    {"idl/text/", {"idl/types/"}},
+    {"physics_pool/sampling/", {"idl/types/"}},
+    {"physics_pool/scene/", {"idl/types/", "idl/text/"}},
+    {"physics_pool/objective/", {"idl/types/", "physics_pool/scene/", "physics_pool/api/"}},
+    {"physics_pool/api/", {"idl/types/", "physics_pool/scene/", "physics_pool/sampling/"}},
+    {"physics_pool/uncertainty/", {"idl/types/", "physics_pool/scene/", "physics_pool/sampling/"}},
+    {"physics_pool/scenarios/", {"idl/types/", "physics_pool/scene/", "physics_pool/sampling/"}},
+    {"physics_pool/coarse/", {"idl/types/", "physics_pool/scene/"}},
+    {"physics_pool/parareal/",
+     {"idl/types/", "physics_pool/scene/", "physics_pool/objective/", "physics_pool/api/", "physics_pool/coarse/"}},
+    {"physics_pool/local/",
+     {"idl/types/", "physics_pool/scene/", "physics_pool/sampling/", "physics_pool/objective/", "physics_pool/api/"}},
+    {"physics_pool/render/", {"idl/types/", "physics_pool/scene/", "physics_pool/local/"}},
+    {"robot_bridge/", {"idl/types/"}},
+    {"perception/", {"idl/types/"}},
+    {"planners/",
+     {"idl/types/", "physics_pool/scene/", "physics_pool/sampling/", "physics_pool/objective/", "physics_pool/api/",
+      "robot_bridge/api/", "perception/api/"}},
+};
+
+// The families of services, lowest first: each may include those before it, and every other room.
+constexpr std::string_view kFamilies[] = {"common", "wire", "pool", "world", "task", "bags", "studies", "tools"};
+
+std::size_t floor_of(std::string_view path) {
+  path.remove_prefix(std::string_view("services/").size());
+  const auto family = std::ranges::find(kFamilies, path.substr(0, path.find('/')));
+  return static_cast<std::size_t>(family - std::begin(kFamilies));
+}
+
+// Bags are files: whoever only reads or writes them starts without a middleware.
+bool is_bag_file(std::string_view file) {
+  return starts_with_any(file, {"services/bags/format/", "services/bags/tool/", "services/bags/selection"});
+}
+
 // Why `file` must not include `include`; empty if it may. Paths are relative to
 // the source directory.
 std::string objection(std::string_view file, std::string_view include) {
-  const bool in_tests = file.starts_with("tests/");
-  if (is_dds(include) && !in_tests && !starts_with_any(file, {"services/", "idl/convert/", "idl/msg/"})) {
-    return "only services/ speaks DDS";
+  if (file.starts_with("tests/")) return "";
+  if (include.starts_with("tests/")) return "nothing may include tests";
+  if (is_dds(include)) return file.starts_with("services/wire/") ? "" : "only services/wire speaks DDS";
+  if (is_wire_type(include)) {
+    if (!file.starts_with("services/")) return "only services know wire types";
+    return is_bag_file(file) ? "bags are files, whatever the types in them" : "";
   }
-  if (file.starts_with("services/bag") &&
-      (is_dds(include) || (include.starts_with("services/dds/") && include != "services/dds/qos.hpp"))) {
-    return "bags are files: of DDS they know what a topic promises, which is a plain value";
+  if (is_engine(include)) {
+    return starts_with_any(file, {"physics_pool/local/", "physics_pool/render/"})
+               ? ""
+               : "only physics_pool/local and physics_pool/render speak MuJoCo";
   }
-  if (is_engine(include) && !in_tests && !starts_with_any(file, {"physics_pool/local/", "physics_pool/render/"})) {
-    return "only physics_pool/local and physics_pool/render speak MuJoCo";
+  if (!is_ours(include)) return "";
+  if (file.starts_with("services/")) {
+    if (is_bag_file(file) && include.starts_with("services/wire/")) return "bags are files: they know no wire";
+    if (!include.starts_with("services/") || floor_of(include) <= floor_of(file)) return "";
+    return "families of services lean on those below them only: common, wire, pool, world, task, bags, studies, tools";
   }
-  if (include.starts_with("tests/") && !in_tests) return "nothing may include tests";
-  if (!is_ours(include) || in_tests) return "";
-
-  const auto allow = [&](std::initializer_list<std::string_view> prefixes, std::string rule) {
-    return starts_with_any(include, prefixes) ? "" : rule;
-  };
-  if (file.starts_with("idl/types/")) return allow({"idl/types/"}, "idl/types stands alone");
-  if (file.starts_with("idl/")) {
-    return starts_with_any(include, {"planners/", "services/", "physics_pool/local/", "physics_pool/render/"})
-               ? "idl converts values and knows no planner, service or engine"
-               : "";
-  }
-  if (starts_with_any(file, {"physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
-                             "physics_pool/sampling/", "physics_pool/coarse/", "physics_pool/parareal/"})) {
-    return allow({"idl/types/", "physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
-                  "physics_pool/sampling/", "physics_pool/coarse/", "physics_pool/parareal/"},
-                 "the engine-free half of physics_pool knows values only");
-  }
-  if (file.starts_with("physics_pool/")) {
-    return allow({"idl/types/", "physics_pool/"}, "physics_pool knows values and itself");
-  }
-  if (file.starts_with("robot_bridge/")) {
-    return allow({"idl/types/", "robot_bridge/"}, "robot_bridge knows values and itself");
-  }
-  if (file.starts_with("perception/")) {
-    return allow({"idl/types/", "perception/"}, "perception knows values and itself");
-  }
-  if (file.starts_with("planners/")) {
-    return allow({"idl/types/", "planners/", "physics_pool/api/", "physics_pool/scene/", "physics_pool/objective/",
-                  "physics_pool/sampling/", "robot_bridge/api/", "perception/api/"},
-                 "planners know a Pool and the two ports, never what is behind them");
-  }
-  return "";
+  const auto room = std::ranges::find_if(kArrows, [&](const Room& r) { return file.starts_with(r.path); });
+  if (room == kArrows.end()) return "this folder has no row in kArrows";
+  const auto may = [&](std::string_view path) { return include.starts_with(path); };
+  if (may(room->path) || std::ranges::any_of(room->may_include, may)) return "";
+  std::string wanted;
+  for (const std::string_view path : room->may_include) wanted += (wanted.empty() ? "" : ", ") + std::string(path);
+  return "this room may include itself and: " + wanted;
 }
 
 struct Include {
@@ -106,7 +134,6 @@ std::vector<fs::path> source_files() {
   const fs::path root = JOSTLE_SOURCE_DIR;
   std::vector<fs::path> files;
   for (const std::string_view room : kRooms) {
-    if (!fs::exists(root / room)) continue;
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / room)) {
       const auto extension = entry.path().extension();
       if (extension == ".cpp" || extension == ".hpp" || extension == ".h") {
@@ -131,11 +158,65 @@ TEST(Architecture, EveryIncludeFollowsTheArrows) {
   }
 }
 
+// What a file sees by way of the headers that it includes, itself left out.
+std::set<std::string> closure_of(const std::string& file) {
+  static std::map<std::string, std::vector<Include>> known;
+  std::set<std::string> seen;
+  std::vector<std::string> open{file};
+  while (!open.empty()) {
+    const std::string path = open.back();
+    open.pop_back();
+    if (!known.contains(path)) {
+      std::ifstream source(fs::path(JOSTLE_SOURCE_DIR) / path);
+      known[path] = includes_of(source);
+    }
+    for (const Include& include : known[path]) {
+      if (seen.insert(include.path).second && is_ours(include.path)) open.push_back(include.path);
+    }
+  }
+  return seen;
+}
+
+TEST(Architecture, EngineAndMiddlewareAreOutOfReachByDetoursToo) {
+  for (const fs::path& path : source_files()) {
+    const std::string file = path.generic_string();
+    if (starts_with_any(file, {"tests/", "physics_pool/local/", "physics_pool/render/"})) continue;
+    for (const std::string& include : closure_of(file)) {
+      EXPECT_FALSE(is_engine(include)) << file << " sees " << include << " by way of a header";
+      if (file.starts_with("services/") && !is_bag_file(file)) continue;
+      EXPECT_FALSE(is_dds(include) || is_wire_type(include)) << file << " sees " << include << " by way of a header";
+    }
+  }
+}
+
+TEST(Architecture, NoHeaderSeesItself) {
+  for (const fs::path& path : source_files()) {
+    const std::string file = path.generic_string();
+    EXPECT_FALSE(closure_of(file).contains(file)) << file << " is in a circle of includes";
+  }
+}
+
+TEST(Architecture, ProgramsAreIncludedByNobody) {
+  std::set<fs::path> programs;
+  for (const fs::path& file : source_files()) {
+    if (file.filename() == "main.cpp") programs.insert(file.parent_path());
+  }
+  ASSERT_GT(programs.size(), 10u);
+  for (const fs::path& file : source_files()) {
+    if (file.generic_string().starts_with("tests/")) continue;
+    for (const std::string& include : closure_of(file.generic_string())) {
+      const fs::path folder = fs::path(include).parent_path();
+      EXPECT_TRUE(!programs.contains(folder) || folder == file.parent_path())
+          << file.generic_string() << " sees " << include << ", which is a program's";
+    }
+  }
+}
+
 TEST(Architecture, OurIncludesExist) {
   for (const fs::path& file : source_files()) {
     std::ifstream source(fs::path(JOSTLE_SOURCE_DIR) / file);
     for (const Include& include : includes_of(source)) {
-      if (!is_ours(include.path) || is_dds(include.path)) continue;
+      if (!is_ours(include.path) || is_wire_type(include.path)) continue;
       EXPECT_TRUE(fs::exists(fs::path(JOSTLE_SOURCE_DIR) / include.path))
           << file.generic_string() << ":" << include.line << ": no " << include.path;
     }
@@ -163,8 +244,10 @@ TEST(Objection, IsRaisedForWrongArrowsOnly) {
       {"planners/pbsto/pbsto.cpp", "fastdds/dds/domain/DomainParticipant.hpp", false},
       {"physics_pool/api/pool.hpp", "fastcdr/Cdr.h", false},
       {"perception/mocap/mocap.cpp", "sensor_msgs/msg/JointState.h", false},
-      {"services/worker/main.cpp", "fastdds/dds/domain/DomainParticipant.hpp", true},
-      {"idl/convert/state.cpp", "jostle_msgs/msg/RolloutPubSubTypes.h", true},
+      {"services/wire/dds/participant.cpp", "fastdds/dds/domain/DomainParticipant.hpp", true},
+      {"services/pool/worker/main.cpp", "fastdds/dds/domain/DomainParticipant.hpp", false},
+      {"services/wire/convert/pool.cpp", "idl/msg/poolPubSubTypes.h", true},
+      {"services/task/session/journal.hpp", "idl/msg/task.h", true},
       {"tests/integration/pool_test.cpp", "fastrtps/utils/IPLocator.h", true},
       {"physics_pool/local/world.cpp", "mujoco/mujoco.h", true},
       {"physics_pool/render/renderer.cpp", "mujoco/mujoco.h", true},
@@ -172,15 +255,21 @@ TEST(Objection, IsRaisedForWrongArrowsOnly) {
       {"physics_pool/coarse/learned/forward.cpp", "mujoco/mujoco.h", false},
       {"physics_pool/coarse/learned/forward.cpp", "physics_pool/local/world.hpp", false},
       {"physics_pool/coarse/learned/forward.cpp", "physics_pool/scene/scene.hpp", true},
-      {"services/worker/main.cpp", "mujoco/mujoco.h", false},
-      {"services/bag/mcap_writer.cpp", "fastcdr/Cdr.h", false},
-      {"services/bag_cli/info.cpp", "services/dds/participant.hpp", false},
-      {"services/bag/message.hpp", "services/dds/qos.hpp", true},
+      {"physics_pool/new_room/file.cpp", "physics_pool/scene/scene.hpp", false},
+      {"services/pool/worker/main.cpp", "mujoco/mujoco.h", false},
+      {"services/bags/format/mcap_writer.cpp", "fastcdr/Cdr.h", false},
+      {"services/bags/tool/info.cpp", "services/wire/dds/participant.hpp", false},
+      {"services/bags/format/message.hpp", "idl/types/qos.hpp", true},
+      {"services/bags/play/player.cpp", "services/wire/dds/participant.hpp", true},
+      {"services/wire/dds/participant.cpp", "services/common/process/domain.hpp", true},
+      {"services/wire/dds/participant.cpp", "services/pool/protocol.hpp", false},
+      {"services/common/process/files.cpp", "services/wire/dds/names.hpp", false},
+      {"services/studies/bench/main.cpp", "services/tools/doctor/check.hpp", false},
       {"planners/pbsto/pbsto.cpp", "mujoco.h", false},
       {"planners/pbsto/pbsto.cpp", "physics_pool/api/pool.hpp", true},
       {"planners/pbsto/pbsto.cpp", "physics_pool/local/thread_pool.hpp", false},
       {"planners/pbsto/pbsto.cpp", "physics_pool/render/renderer.hpp", false},
-      {"planners/control/controller.cpp", "services/config/parameters.hpp", false},
+      {"planners/control/controller.cpp", "services/task/config/parameters.hpp", false},
       {"planners/control/controller.cpp", "robot_bridge/api/robot.hpp", true},
       {"planners/control/controller.cpp", "robot_bridge/fake/fake.hpp", false},
       {"idl/types/state.hpp", "physics_pool/api/pool.hpp", false},
@@ -189,8 +278,8 @@ TEST(Objection, IsRaisedForWrongArrowsOnly) {
       {"physics_pool/scene/scene.cpp", "physics_pool/local/world.hpp", false},
       {"physics_pool/local/world.cpp", "planners/api/planner.hpp", false},
       {"robot_bridge/api/robot.hpp", "perception/api/object_source.hpp", false},
-      {"services/config/parameters.cpp", "planners/pbsto/pbsto.hpp", true},
-      {"services/config/parameters.cpp", "tests/support/scenes.hpp", false},
+      {"services/task/config/parameters.cpp", "planners/pbsto/pbsto.hpp", true},
+      {"services/task/config/parameters.cpp", "tests/support/scenes.hpp", false},
       {"tests/unit/a_test.cpp", "tests/support/scenes.hpp", true},
   };
   for (const Arrow& arrow : arrows) {

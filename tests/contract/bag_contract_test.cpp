@@ -12,7 +12,7 @@
 #include <fstream>
 #include <functional>
 
-#include "services/bag/folder_reader.hpp"
+#include "services/bags/format/folder_reader.hpp"
 #include "tests/support/bags.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -20,11 +20,11 @@ namespace jostle::tests {
 namespace {
 
 namespace fs = std::filesystem;
-using bag::BagOptions;
-using bag::BagReader;
-using bag::BagWriter;
-using bag::Message;
-using bag::Time;
+using bags::BagOptions;
+using bags::BagReader;
+using bags::BagWriter;
+using bags::Message;
+using bags::Time;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -75,8 +75,8 @@ class BagContract : public ::testing::TestWithParam<Kind> {
 
 TEST_P(BagContract, GivesBackWhatWasWritten) {
   const auto sut = writer();
-  const bag::Topic latched = string_topic("/b", dds::kLatched);
-  bag::Topic retained = string_topic("/a", {.reliable = false, .retained = true, .depth = 7, .instances = 3});
+  const bags::Topic latched = string_topic("/b", kLatched);
+  bags::Topic retained = string_topic("/a", {.reliable = false, .retained = true, .depth = 7, .instances = 3});
   retained.type = "jostle_msgs/msg/RobotStatus";
   const int b = taken(sut->add_topic(latched)), a = taken(sut->add_topic(retained));
   write(*sut, b, kBegin, "one");
@@ -85,7 +85,7 @@ TEST_P(BagContract, GivesBackWhatWasWritten) {
   taken(sut->close());
 
   const auto back = reader();
-  const bag::BagInfo& info = back->info();
+  const bags::BagInfo& info = back->info();
   ASSERT_EQ(info.topics.size(), 2u);
   if (!GetParam().keeps_everything) retained.definition.clear();
   EXPECT_EQ(info.topics[0].topic, retained);
@@ -200,7 +200,7 @@ TEST_P(BagContract, SplitsByTimeAndRepeatsLatchedSamplesOnce) {
   BagOptions options = GetParam().options;
   options.split_time = std::chrono::nanoseconds(10);
   const auto sut = writer(options);
-  const int map = taken(sut->add_topic(string_topic("/map", dds::kLatched)));
+  const int map = taken(sut->add_topic(string_topic("/map", kLatched)));
   const int x = taken(sut->add_topic(string_topic("/x")));
   write(*sut, map, kBegin, "first map");
   write(*sut, map, kBegin + 1, "map");
@@ -274,8 +274,8 @@ TEST_P(BagContract, KeepsNotes) {
   sut->set_note("lost", {{"/x", "4"}, {"/y", ""}});
   taken(sut->close());
   const auto notes = reader()->info().notes;
-  EXPECT_EQ(notes, (std::map<std::string, bag::Note>{{"record", {{"command", "jostle record \"a\\b\"\n"}}},
-                                                     {"lost", {{"/x", "4"}, {"/y", ""}}}}));
+  EXPECT_EQ(notes, (std::map<std::string, bags::Note>{{"record", {{"command", "jostle record \"a\\b\"\n"}}},
+                                                      {"lost", {{"/x", "4"}, {"/y", ""}}}}));
 }
 
 TEST_P(BagContract, TakesLargeMessages) {
@@ -347,7 +347,7 @@ TEST_P(BagContract, NeverCrashesOnATruncatedFile) {
     } else {
       EXPECT_THAT(opened.error().message, HasSubstr(file(0).string()));
     }
-    if (const auto saved = bag::open_bag(bag_, true)) {
+    if (const auto saved = bags::open_bag(bag_, true)) {
       int count = 0;
       while (true) {
         const auto message = (*saved)->next();
@@ -374,11 +374,11 @@ TEST_P(BagContract, KeepsWhatWasFlushedWhenTheWriterIsKilled) {
         raise(SIGKILL);
       },
       [](int status) { return WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL; });
-  const auto saved = taken(bag::open_bag(bag_, true));
+  const auto saved = taken(bags::open_bag(bag_, true));
   const auto messages = rest_of(*saved);
   ASSERT_GE(messages.size(), 1000u);
   for (int i = 0; i < 1000; ++i) EXPECT_EQ(text_of(messages[static_cast<std::size_t>(i)].data), std::to_string(i));
-  EXPECT_EQ(saved->info().notes.at("lost"), (bag::Note{{"/x", "2"}}));
+  EXPECT_EQ(saved->info().notes.at("lost"), (bags::Note{{"/x", "2"}}));
 }
 
 // Killed in the middle of whatever it does, not where it is convenient.
@@ -410,7 +410,7 @@ TEST_P(BagContract, KeepsWhatWasFlushedWheneverTheWriterIsKilled) {
     while (read(ends[0], &flushed, sizeof flushed) == static_cast<ssize_t>(sizeof flushed)) continue;
     close(ends[0]);
     ASSERT_EQ(waitpid(child, nullptr, 0), child);
-    const auto saved = taken(bag::open_bag(bag, true));
+    const auto saved = taken(bags::open_bag(bag, true));
     const auto messages = rest_of(*saved);
     ASSERT_GE(messages.size(), static_cast<std::size_t>(flushed));
     for (std::size_t i = 0; i < messages.size(); ++i) ASSERT_EQ(text_of(messages[i].data), std::to_string(i));

@@ -9,7 +9,7 @@
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/parareal/parareal_pool.hpp"
-#include "services/pool_remote/remote_pool.hpp"
+#include "services/pool/client/remote_pool.hpp"
 #include "tests/support/batches.hpp"
 #include "tests/support/pushing.hpp"
 #include "tests/support/worker_process.hpp"
@@ -46,8 +46,8 @@ struct Rig {
 
   void find_workers(const Implementation& implementation) {
     for (int i = 0; i < implementation.workers; ++i) workers.emplace_back(test_domain());
-    participant = dds::Participant::open({.domain = test_domain()}).value();
-    auto remote = std::make_unique<services::RemotePool>(*participant);
+    participant = wire::Participant::open({.domain = test_domain()}).value();
+    auto remote = std::make_unique<pool::RemotePool>(*participant);
     if (!remote->wait_for_workers(implementation.workers, in(kPatience))) {
       throw std::runtime_error("the workers were not found");
     }
@@ -55,7 +55,7 @@ struct Rig {
   }
 
   std::vector<WorkerProcess> workers;
-  std::optional<dds::Participant> participant;
+  std::optional<wire::Participant> participant;
   std::unique_ptr<AsyncPool> engines;
   std::unique_ptr<PararealPool> parareal;
 };

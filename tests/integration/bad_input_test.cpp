@@ -7,8 +7,8 @@
 
 #include <cmath>
 
-#include "services/dds/reader.hpp"
-#include "services/dds/topics.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -142,9 +142,9 @@ class Stranger : public RunFixture {
   }
 
   template <class Message>
-  void send(const dds::Topic<Message>& topic, int readers, const Message& message) {
-    auto& writer = *std::static_pointer_cast<dds::Writer<Message>>(
-        writers.emplace_back(std::make_shared<dds::Writer<Message>>(participant, topic)));
+  void send(const wire::Topic<Message>& topic, int readers, const Message& message) {
+    auto& writer = *std::static_pointer_cast<wire::Writer<Message>>(
+        writers.emplace_back(std::make_shared<wire::Writer<Message>>(participant, topic)));
     ASSERT_TRUE(writer.wait_for_readers(std::chrono::steady_clock::now() + kPatience, readers));
     ASSERT_TRUE(writer.write(message));
   }
@@ -161,9 +161,9 @@ class Stranger : public RunFixture {
     EXPECT_EQ(run->wait(kPatience), 0) << run->err();
   }
 
-  const dds::Participant participant = dds::Participant::open({.domain = domain}).value();
-  dds::Inbox<jostle_msgs::msg::RobotStatus> statuses{participant, topics::kRobotStatus, 1};
-  std::vector<std::shared_ptr<dds::WriterBase>> writers;
+  const wire::Participant participant = wire::Participant::open({.domain = domain}).value();
+  wire::Inbox<jostle_msgs::msg::RobotStatus> statuses{participant, wire::topics::kRobotStatus, 1};
+  std::vector<std::shared_ptr<wire::WriterBase>> writers;
 };
 
 TEST_F(Stranger, ObjectWithoutAPositionIsRejectedByName) {
@@ -174,7 +174,7 @@ TEST_F(Stranger, ObjectWithoutAPositionIsRejectedByName) {
   objects.objects()[1].name("can");
   objects.objects()[1].pose().position().x(kNaN);
 
-  send(topics::kObjectStates, 1, objects);
+  send(wire::topics::kObjectStates, 1, objects);
 
   expect_named_and_survived("coordinator.log", "rt/objects/states: objects[1] ('can').pose.position.x: got nan");
 }
@@ -185,7 +185,7 @@ TEST_F(Stranger, RobotWithoutAPositionIsRejectedByName) {
   spoilt->q().at(2) = -kNaN;
   spoilt->busy(false);
 
-  send(topics::kRobotStatus, 3, *spoilt);  // run, coordinator, this test
+  send(wire::topics::kRobotStatus, 3, *spoilt);  // run, coordinator, this test
 
   expect_named_and_survived("coordinator.log", "rt/robot/status: q[2]: got ");
 }
@@ -199,7 +199,7 @@ TEST_F(Stranger, CommandThatIsNoneTakesTheRobotFromNobody) {
   command.velocities({0.0, kNaN, 0.0, 0.0});
   command.duration(1.0);
 
-  send(topics::kRobotCommand, 1, command);
+  send(wire::topics::kRobotCommand, 1, command);
 
   expect_named_and_survived("sim.log", "velocities[1]: got nan");
 }
@@ -213,7 +213,7 @@ TEST_F(Stranger, NewCommanderEndsTheRunInPlainWords) {
   command.velocities({0.0, 0.0, 0.0, 0.0});
   command.duration(0.1);
 
-  send(topics::kRobotCommand, 1, command);
+  send(wire::topics::kRobotCommand, 1, command);
 
   EXPECT_EQ(run->wait(20s), 3);
   EXPECT_THAT(run->err(), HasSubstr("robot: another commander took over"));

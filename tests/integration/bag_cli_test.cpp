@@ -5,7 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "services/bag/definitions.hpp"
+#include "services/bags/format/definitions.hpp"
 #include "tests/support/bags.hpp"
 #include "tests/support/program_process.hpp"
 
@@ -14,15 +14,15 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
-using bag::BagOptions;
-using bag::BagReader;
-using bag::BagWriter;
+using bags::BagOptions;
+using bags::BagReader;
+using bags::BagWriter;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-constexpr bag::Time kBegin = 1'700'000'000'000'000'000;
-constexpr bag::Time kSecond = 1'000'000'000;
+constexpr bags::Time kBegin = 1'700'000'000'000'000'000;
+constexpr bags::Time kSecond = 1'000'000'000;
 
 // CDR of a geometry_msgs/msg/Point.
 Bytes point(double x, double y, double z) {
@@ -46,15 +46,15 @@ class BagCli : public ::testing::TestWithParam<BagOptions::Storage> {
   // Ten seconds: a text every second, a point every half, and one thing that nobody can decode.
   void write_bag() {
     const auto writer = taken(BagWriter::create(path, {.storage = GetParam()}));
-    const int text = taken(writer->add_topic(string_topic("/robot/text", dds::kLatched)));
-    bag::Topic points{.name = "/robot/point",
-                      .type = "geometry_msgs/msg/Point",
-                      .qos = dds::kStream,
-                      .definition = bag::definition_of("geometry_msgs/msg/Point").value()};
+    const int text = taken(writer->add_topic(string_topic("/robot/text", kLatched)));
+    bags::Topic points{.name = "/robot/point",
+                       .type = "geometry_msgs/msg/Point",
+                       .qos = kStream,
+                       .definition = bags::definition_of("geometry_msgs/msg/Point").value()};
     const int where = taken(writer->add_topic(points));
     const int other = taken(writer->add_topic({.name = "/other", .type = "some_msgs/msg/Other"}));
     for (int i = 0; i <= 20; ++i) {
-      const bag::Time time = kBegin + i * kSecond / 2;
+      const bags::Time time = kBegin + i * kSecond / 2;
       if (i % 2 == 0) {
         taken(writer->write(
             text, {.log_time = time, .publish_time = time, .data = cdr_of("a \"text\", " + std::to_string(i / 2))}));
@@ -87,7 +87,7 @@ class BagCli : public ::testing::TestWithParam<BagOptions::Storage> {
     EXPECT_GT(back->info().messages, least);
     EXPECT_LT(back->info().messages, static_cast<std::uint64_t>(kNoises));
     EXPECT_EQ(back->info().notes.at("recovered").at("from"), path);
-    for (const bag::Message& message : rest_of(*back)) {
+    for (const bags::Message& message : rest_of(*back)) {
       ASSERT_EQ(message.data, noise(100, static_cast<std::uint64_t>(message.log_time - kBegin)));
     }
   }

@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
-#include "services/dds/topics.hpp"
-#include "services/dds/writer.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -145,8 +145,8 @@ TEST_F(Deaths, SecondRunOnADomainIsToldSoAndTheFirstGoesOn) {
 
 // Another run's coordinator may be heard before our own has started.
 TEST_F(Deaths, RunThatHearsOfAnothersTaskSaysThatTheDomainIsTaken) {
-  const auto participant = dds::Participant::open({.domain = domain}).value();
-  dds::Writer<jostle_msgs::msg::Feedback> other(participant, topics::kTaskFeedback);
+  const auto participant = wire::Participant::open({.domain = domain}).value();
+  wire::Writer<jostle_msgs::msg::Feedback> other(participant, wire::topics::kTaskFeedback);
   jostle_msgs::msg::Feedback feedback;
   feedback.goal_id("another run's");
 

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "services/support/hosts.hpp"
+#include "services/common/lab/hosts.hpp"
 #include "tests/support/program_process.hpp"
 #include "tests/support/worker_process.hpp"
 
@@ -16,8 +16,8 @@ namespace jostle::tests {
 namespace {
 
 using namespace std::chrono_literals;
+using common::Hosts;
 using nlohmann::json;
-using services::Hosts;
 using ::testing::AnyOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;

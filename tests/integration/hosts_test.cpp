@@ -4,15 +4,15 @@
 
 #include <nlohmann/json.hpp>
 
-#include "services/support/hosts.hpp"
+#include "services/common/lab/hosts.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
 namespace {
 
+using common::Hosts;
+using common::LinkQuality;
 using nlohmann::json;
-using services::Hosts;
-using services::LinkQuality;
 using ::testing::HasSubstr;
 
 constexpr int kRobot = 1, kFirst = 2, kSecond = 3;  // hosts

@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "services/dds/reader.hpp"
-#include "services/dds/topics.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -53,13 +53,13 @@ TEST_F(Namespace, TwoRunsAtATimeGraspAsEachDoesAlone) {
 }
 
 TEST_F(Namespace, TopicsAreThoseOfRos2AndWorkersAreEverybodys) {
-  const auto participant = dds::Participant::open({.domain = domain}).value();
-  const auto named = [](const std::string& name, const dds::Qos& qos) {
-    return dds::Topic<jostle_msgs::msg::Feedback>{name, qos, dds::Scope::kDomain};
+  const auto participant = wire::Participant::open({.domain = domain}).value();
+  const auto named = [](const std::string& name, const Qos& qos) {
+    return wire::Topic<jostle_msgs::msg::Feedback>{name, qos, wire::Scope::kDomain};
   };
-  dds::Inbox<jostle_msgs::msg::Feedback> inside(participant, named("rt/left/task/feedback", topics::kTaskFeedback.qos),
-                                                64);
-  dds::Inbox<jostle_msgs::msg::Feedback> outside(participant, topics::kTaskFeedback, 64);
+  wire::Inbox<jostle_msgs::msg::Feedback> inside(participant,
+                                                 named("rt/left/task/feedback", wire::topics::kTaskFeedback.qos), 64);
+  wire::Inbox<jostle_msgs::msg::Feedback> outside(participant, wire::topics::kTaskFeedback, 64);
   const WorkerProcess worker(domain);  // without a namespace
 
   const auto left = program("jostle_run", {easy, "--headless", "--workers", "0", "--plan-only", "--parameters", plain,

@@ -5,9 +5,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "services/dds/reader.hpp"
-#include "services/dds/topics.hpp"
-#include "services/world_link/world_client.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/world/link/world_client.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -26,16 +26,16 @@ class Observers : public RunFixture {
     return nlohmann::json::parse(contents(file), nullptr, false)["plan_hash"];
   }
 
-  const dds::Participant participant = dds::Participant::open({.domain = domain}).value();
+  const wire::Participant participant = wire::Participant::open({.domain = domain}).value();
 };
 
 TEST_F(Observers, OfGoalsAndCommandsHearThemAndChangeNothing) {
   const auto alone = plan_of_a_run();
-  dds::Inbox<Goal> goals(participant, topics::kTaskGoal, 64);
-  dds::Inbox<VelocityCommand> commands(participant, topics::kRobotCommand, 64);
-  const dds::Inbox<Feedback> feedback(participant, topics::kTaskFeedback, 64);
-  const dds::Inbox<GoalResult> results(participant, topics::kTaskResult, 64);
-  const dds::Inbox<RobotStatus> statuses(participant, topics::kRobotStatus, 64);
+  wire::Inbox<Goal> goals(participant, wire::topics::kTaskGoal, 64);
+  wire::Inbox<VelocityCommand> commands(participant, wire::topics::kRobotCommand, 64);
+  const wire::Inbox<Feedback> feedback(participant, wire::topics::kTaskFeedback, 64);
+  const wire::Inbox<GoalResult> results(participant, wire::topics::kTaskResult, 64);
+  const wire::Inbox<RobotStatus> statuses(participant, wire::topics::kRobotStatus, 64);
 
   const auto watched = plan_of_a_run();
 
@@ -46,8 +46,8 @@ TEST_F(Observers, OfGoalsAndCommandsHearThemAndChangeNothing) {
 
 // Its reader is found at once, the robot's much later.
 TEST_F(Observers, AreNoRobotThatACommandCouldReach) {
-  const dds::Inbox<VelocityCommand> observer(participant, topics::kRobotCommand, 64);
-  services::RobotClient sut(participant, {.silence = kPatience, .start = kPatience});
+  const wire::Inbox<VelocityCommand> observer(participant, wire::topics::kRobotCommand, 64);
+  world::RobotClient sut(participant, {.silence = kPatience, .start = kPatience});
   const auto sim = program("jostle_sim", {easy});
 
   const auto executed = sut.execute(std::array{0.05, 0.0, 0.0, 0.0}, 0.2, {});
@@ -57,8 +57,8 @@ TEST_F(Observers, AreNoRobotThatACommandCouldReach) {
 
 // Statuses from one that reads no commands: a player, say.
 TEST_F(Observers, WhoOnlySpeaksLikeARobotIsReported) {
-  dds::Writer<RobotStatus> speaker(participant, topics::kRobotStatus);
-  services::RobotClient sut(participant, {.silence = kPatience, .start = 300ms});
+  wire::Writer<RobotStatus> speaker(participant, wire::topics::kRobotStatus);
+  world::RobotClient sut(participant, {.silence = kPatience, .start = 300ms});
   const std::jthread speaking(
       [&](std::stop_token stop) { soon(kPatience, [&] { return !speaker.write({}) || stop.stop_requested(); }); });
 
@@ -71,7 +71,7 @@ TEST_F(Observers, WhoOnlySpeaksLikeARobotIsReported) {
 
 TEST_F(Observers, AnIdleCoordinatorIsNone) {
   const auto other = program("jostle_coordinator", {"--pool", "threads", "--threads", "1"});
-  const dds::Writer<Goal> goals(participant, topics::kTaskGoal);
+  const wire::Writer<Goal> goals(participant, wire::topics::kTaskGoal);
   ASSERT_TRUE(goals.wait_for_readers(in(kPatience))) << other->err();
 
   start({easy, "--parameters", plain, "--workers", "1", "--plan-only"});

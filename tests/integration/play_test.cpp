@@ -9,8 +9,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "services/dds/cdr.hpp"
-#include "services/dds/topics.hpp"
+#include "services/wire/dds/cdr.hpp"
+#include "services/wire/dds/topics.hpp"
 #include "tests/support/bags.hpp"
 #include "tests/support/program_process.hpp"
 #include "tests/support/raw_subscriber.hpp"
@@ -33,9 +33,9 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr std::chrono::seconds kPatience{60};
-constexpr bag::Time kBegin = 1'700'000'000'000'000'000;
+constexpr bags::Time kBegin = 1'700'000'000'000'000'000;
 
-constexpr dds::Qos kAsksForKept{.latched = true, .depth = 10};
+constexpr Qos kAsksForKept{.latched = true, .depth = 10};
 
 class Play : public ::testing::Test {
  protected:
@@ -45,13 +45,13 @@ class Play : public ::testing::Test {
     std::chrono::nanoseconds offset;
     std::string text;
   };
-  void write_bag(const std::vector<bag::Topic>& topics, const std::vector<Entry>& entries,
-                 const bag::BagOptions& options = {}) {
-    auto writer = taken(bag::BagWriter::create(bag, options));
-    for (const bag::Topic& topic : topics) taken(writer->add_topic(topic));
+  void write_bag(const std::vector<bags::Topic>& topics, const std::vector<Entry>& entries,
+                 const bags::BagOptions& options = {}) {
+    auto writer = taken(bags::BagWriter::create(bag, options));
+    for (const bags::Topic& topic : topics) taken(writer->add_topic(topic));
     for (const auto& [topic, offset, text] : entries) {
       const auto data = cdr_of(text);
-      const bag::Time time = kBegin + offset.count();
+      const bags::Time time = kBegin + offset.count();
       taken(writer->write(topic, {.log_time = time, .publish_time = time, .data = data}));
     }
     taken(writer->close());
@@ -67,8 +67,8 @@ class Play : public ::testing::Test {
       entries.push_back({2, time + 1ms, "note" + std::to_string(i)});
     }
     // Known as a state by its name: its type is never looked into.
-    write_bag({string_topic("/task/run", dds::kLatched),
-               {.name = "/robot/status", .type = "jostle_msgs/msg/RobotStatus", .qos = dds::kState},
+    write_bag({string_topic("/task/run", kLatched),
+               {.name = "/robot/status", .type = "jostle_msgs/msg/RobotStatus", .qos = kState},
                string_topic("/notes")},
               entries);
   }
@@ -94,11 +94,11 @@ class Play : public ::testing::Test {
     return code == 0 ? nlohmann::json::parse(client.out()) : nlohmann::json();
   }
 
-  const dds::Participant& participant() {
-    if (!participant_) participant_.emplace(dds::Participant::open({.domain = domain}).value());
+  const wire::Participant& participant() {
+    if (!participant_) participant_.emplace(wire::Participant::open({.domain = domain}).value());
     return *participant_;
   }
-  std::unique_ptr<RawSubscriber> subscribe(const std::string& topic, const dds::Qos& qos = {.depth = dds::kKeepAll}) {
+  std::unique_ptr<RawSubscriber> subscribe(const std::string& topic, const Qos& qos = {.depth = kKeepAll}) {
     const bool status = topic.ends_with("/robot/status");
     return std::make_unique<RawSubscriber>(participant(), topic,
                                            status ? "jostle_msgs/msg/RobotStatus" : "std_msgs/msg/String", qos);
@@ -119,7 +119,7 @@ class Play : public ::testing::Test {
   std::unique_ptr<ProgramProcess> player;
 
  private:
-  std::optional<dds::Participant> participant_;
+  std::optional<wire::Participant> participant_;
 };
 
 // ---------------------------------------------------------------- order and bytes
@@ -129,15 +129,15 @@ class PlayRates : public Play, public ::testing::WithParamInterface<std::string>
 TEST_P(PlayRates, EveryMessageArrivesAsItWasInOrder) {
   std::map<int, std::vector<Bytes>> sent;
   {
-    auto writer = taken(bag::BagWriter::create(bag, {}));
-    for (const char* name : {"/a", "/b", "/c"}) taken(writer->add_topic(string_topic(name, dds::kCommand)));
+    auto writer = taken(bags::BagWriter::create(bag, {}));
+    for (const char* name : {"/a", "/b", "/c"}) taken(writer->add_topic(string_topic(name, kCommand)));
     for (int i = 0; i < 400; ++i) {
       const int topic = i * i % 3;  // irregular
       // The wire pads to four bytes, and so do recordings of it.
       Bytes data = noise(static_cast<std::size_t>(i % 7 == 0 ? 20'000 : 40 + 4 * i), static_cast<std::uint64_t>(i));
       data[0] = data[2] = data[3] = std::byte{0};
       data[1] = std::byte{1};
-      const bag::Time time = kBegin + i * i * 4000;  // the last one after 0.64 s
+      const bags::Time time = kBegin + i * i * 4000;  // the last one after 0.64 s
       taken(writer->write(topic, {.log_time = time, .publish_time = time, .data = data}));
       sent[topic].push_back(std::move(data));
     }
@@ -166,7 +166,7 @@ TEST_P(PlayRates, EveryMessageArrivesAsItWasInOrder) {
 INSTANTIATE_TEST_SUITE_P(Integration, PlayRates, ::testing::Values("0.5", "1", "10"));
 
 TEST_F(Play, ABagOfSqliteIsPlayedToo) {
-  write_bag({string_topic("/a")}, {{0, 0ms, "a0"}, {0, 1ms, "a1"}}, {.storage = bag::BagOptions::Storage::kSqlite});
+  write_bag({string_topic("/a")}, {{0, 0ms, "a0"}, {0, 1ms, "a1"}}, {.storage = bags::BagOptions::Storage::kSqlite});
   const auto a = subscribe("/a");
   start({"--wait-for-subscribers=1"});
   EXPECT_EQ(player->wait(kPatience), 0) << player->err();
@@ -250,8 +250,7 @@ TEST_F(Play, ALateSubscriberAfterASeekGetsTheSceneAndTheStateOfThatMoment) {
 }
 
 TEST_F(Play, ASeekBackTakesBackWhatHadNotHappenedYet) {
-  write_bag({string_topic("/first"), string_topic("/late", dds::kLatched)},
-            {{0, 0ms, "f"}, {1, 1s, "late"}, {0, 2s, "g"}});
+  write_bag({string_topic("/first"), string_topic("/late", kLatched)}, {{0, 0ms, "f"}, {1, 1s, "late"}, {0, 2s, "g"}});
   start_and_wait({"--paused"});
   tell({"step", "step", "seek:0.5"});
   const auto late = subscribe("/late", {.latched = true, .depth = 1});
@@ -295,7 +294,7 @@ TEST_F(Play, RemapsGlobsAndLeavesCommandsOut) {
   write_bag({string_topic("/a/x"),
              string_topic("/a/y"),
              string_topic("/b"),
-             {.name = "/robot/command", .type = "jostle_msgs/msg/VelocityCommand", .qos = dds::kCommand}},
+             {.name = "/robot/command", .type = "jostle_msgs/msg/VelocityCommand", .qos = kCommand}},
             {{0, 0ms, "x"}, {1, 0ms, "y"}, {2, 0ms, "b"}, {3, 0ms, "c"}});
   const RawSubscriber command(participant(), "/robot/command", "jostle_msgs/msg/VelocityCommand");
   const auto moved = subscribe("/lab/x"), y = subscribe("/a/y"), b = subscribe("/b");
@@ -321,7 +320,7 @@ TEST_F(Play, RemapsGlobsAndLeavesCommandsOut) {
 
 TEST_F(Play, WarnsOfAnotherPublisher) {
   write_run();
-  const dds::RawWriter other(participant(), {"rt/notes", "std_msgs::msg::dds_::String_", {}});
+  const wire::RawWriter other(participant(), {"rt/notes", "std_msgs::msg::dds_::String_", {}});
   start({"--paused"});
   EXPECT_TRUE(player->says("another publisher of /notes", kPatience)) << player->err();
 }
@@ -334,7 +333,7 @@ TEST_F(Play, ClockShowsTheBagsTime) {
   EXPECT_EQ(player->wait(kPatience), 0) << player->err();
   std::vector<std::int64_t> times;
   for (const Bytes& sample : clock.samples()) {
-    const auto time = dds::from_cdr<rosgraph_msgs::msg::Clock>(sample).value().clock();
+    const auto time = wire::from_cdr<rosgraph_msgs::msg::Clock>(sample).value().clock();
     times.push_back(time.sec() * 1'000'000'000ll + time.nanosec());
   }
   // 0.3 s at 200 Hz are 60; a busy machine may skip some.
@@ -405,7 +404,7 @@ TEST_F(Play, ATruncatedBagGetsAClearError) {
 
 TEST_F(Play, DamageInTheMiddleEndsThePlaybackThere) {
   // Chunks of their own for what comes later: noise that does not compress.
-  auto writer = taken(bag::BagWriter::create(bag, {}));
+  auto writer = taken(bags::BagWriter::create(bag, {}));
   taken(writer->add_topic(string_topic("/a")));
   for (int i = 0; i < 40; ++i) {
     Bytes data = noise(200'000, static_cast<std::uint64_t>(i));

@@ -7,7 +7,7 @@
 #include <future>
 
 #include "physics_pool/local/thread_pool.hpp"
-#include "services/pool_remote/remote_pool.hpp"
+#include "services/pool/client/remote_pool.hpp"
 #include "tests/support/batches.hpp"
 #include "tests/support/worker_process.hpp"
 
@@ -16,7 +16,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using namespace physics_pool;
-using services::RemotePool;
+using pool::RemotePool;
 using ::testing::HasSubstr;
 
 constexpr auto kPatience = 60s;
@@ -61,7 +61,7 @@ class PoolFailures : public ::testing::Test {
   const int domain = test_domain();
   const Scene scene = small_scene();
   std::deque<WorkerProcess> workers;
-  const dds::Participant participant = dds::Participant::open({.domain = domain}).value();
+  const wire::Participant participant = wire::Participant::open({.domain = domain}).value();
   RemotePool sut{participant};
 };
 

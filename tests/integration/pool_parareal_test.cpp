@@ -7,7 +7,7 @@
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/parareal/parareal_pool.hpp"
-#include "services/pool_remote/remote_pool.hpp"
+#include "services/pool/client/remote_pool.hpp"
 #include "tests/support/batches.hpp"
 #include "tests/support/pushing.hpp"
 #include "tests/support/worker_process.hpp"
@@ -33,8 +33,8 @@ class PararealOverDds : public ::testing::TestWithParam<int> {
   const Scene scene = GetParam() == 1 ? pushing_scene(-0.075, 0.02, {slider_box("box", 0.0, 0.0)}) : four_sliders();
   const int domain = test_domain();
   std::vector<WorkerProcess> workers;
-  dds::Participant participant = dds::Participant::open({.domain = domain}).value();
-  services::RemotePool remote{participant};
+  wire::Participant participant = wire::Participant::open({.domain = domain}).value();
+  pool::RemotePool remote{participant};
   ThreadPool thread{1};
 };
 

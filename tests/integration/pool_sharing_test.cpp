@@ -8,7 +8,7 @@
 #include <map>
 #include <numeric>
 
-#include "services/pool_remote/remote_pool.hpp"
+#include "services/pool/client/remote_pool.hpp"
 #include "tests/support/batches.hpp"
 #include "tests/support/worker_process.hpp"
 
@@ -17,13 +17,13 @@ namespace {
 
 using namespace std::chrono_literals;
 using namespace physics_pool;
-using services::RemotePool;
+using pool::RemotePool;
 
 constexpr auto kPatience = 60s;
 
 struct Client {
-  explicit Client(int domain, const services::RemotePoolOptions& options = {})
-      : participant(dds::Participant::open({.domain = domain}).value()), pool(participant, options) {}
+  explicit Client(int domain, const pool::RemotePoolOptions& options = {})
+      : participant(wire::Participant::open({.domain = domain}).value()), pool(participant, options) {}
 
   std::uint64_t rollouts() const {
     const auto workers = pool.status().workers;
@@ -31,7 +31,7 @@ struct Client {
                            [](std::uint64_t sum, const WorkerStatus& worker) { return sum + worker.rollouts; });
   }
 
-  const dds::Participant participant;
+  const wire::Participant participant;
   RemotePool pool;
 };
 
@@ -152,15 +152,15 @@ TEST_F(PoolSharing, BatchThatHasToWaitIsNeitherReissuedNorCopied) {
 
 TEST_F(PoolSharing, EverySampleIsTracedFromSendingToReceiving) {
   start(2, 0);
-  std::vector<services::SampleTrace> traces;  // complete when run() returns
-  Client client(domain, {.on_sample = [&](const services::SampleTrace& trace) { traces.push_back(trace); }});
+  std::vector<pool::SampleTrace> traces;  // complete when run() returns
+  Client client(domain, {.on_sample = [&](const pool::SampleTrace& trace) { traces.push_back(trace); }});
   ASSERT_TRUE(client.pool.load(scene));
   ASSERT_TRUE(client.pool.wait_for_workers(2, in(kPatience)));
 
   ASSERT_TRUE(client.pool.run(wait_batch(scene, 20, 5ms), in(kPatience)));
 
   std::map<std::uint32_t, int> firsts;
-  for (const services::SampleTrace& trace : traces) {
+  for (const pool::SampleTrace& trace : traces) {
     firsts[trace.sample] += trace.first;
     EXPECT_EQ(trace.client, client.participant.id());
     EXPECT_EQ(trace.thread, 0u);
@@ -172,7 +172,7 @@ TEST_F(PoolSharing, EverySampleIsTracedFromSendingToReceiving) {
   }
   EXPECT_EQ(firsts.size(), 20u);
   for (const auto& [sample, count] : firsts) EXPECT_EQ(count, 1) << sample;
-  const services::Timeline timeline = services::timeline_of(traces, client.pool.status().workers);
+  const pool::Timeline timeline = pool::timeline_of(traces, client.pool.status().workers);
   EXPECT_EQ(timeline.rows.size(), 2u);
   EXPECT_GT(timeline.efficiency, 0.3);
   EXPECT_LT(timeline.clock_error, 0.05);

@@ -2,9 +2,9 @@
 
 #include <gmock/gmock.h>
 
-#include "idl/convert/pool.hpp"
-#include "services/dds/reader.hpp"
-#include "services/dds/topics.hpp"
+#include "services/wire/convert/pool.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
 #include "tests/support/batches.hpp"
 #include "tests/support/worker_process.hpp"
 
@@ -24,7 +24,7 @@ class PoolWire : public ::testing::Test {
  protected:
   PoolWire() {
     worker_id = hear_worker();
-    tasks = std::make_unique<dds::Writer<Task>>(participant, topics::pool_task(worker_id));
+    tasks = std::make_unique<wire::Writer<Task>>(participant, wire::topics::pool_task(worker_id));
     EXPECT_TRUE(tasks->wait_for_readers(in(kPatience)));
     announce(physics_pool::scene_hash(scene), physics_pool::to_yaml(scene));
   }
@@ -51,7 +51,7 @@ class PoolWire : public ::testing::Test {
     Task task;
     task.client(participant.id());
     task.epoch(++epoch);
-    task.batch(convert::to_wire(push_batch(scene, 2)));
+    task.batch(wire::to_wire(push_batch(scene, 2)));
     task.best_cost(physics_pool::kInfinity);
     task.first_success(UINT32_MAX);
     task.samples({0, 1});
@@ -77,12 +77,12 @@ class PoolWire : public ::testing::Test {
   const int domain = test_domain();
   const Scene scene = small_scene();
   const WorkerProcess worker{domain};
-  const dds::Participant participant = dds::Participant::open({.domain = domain}).value();
-  dds::Inbox<WorkerHeartbeat> heartbeats{participant, topics::kPoolWorker, 10};
-  dds::Inbox<TaskResult> results{participant, topics::kPoolResult, 100};
-  dds::Writer<WorldDescription> worlds{participant, topics::kPoolWorld};
-  dds::Writer<BatchControl> controls{participant, topics::kPoolControl};
-  std::unique_ptr<dds::Writer<Task>> tasks;
+  const wire::Participant participant = wire::Participant::open({.domain = domain}).value();
+  wire::Inbox<WorkerHeartbeat> heartbeats{participant, wire::topics::kPoolWorker, 10};
+  wire::Inbox<TaskResult> results{participant, wire::topics::kPoolResult, 100};
+  wire::Writer<WorldDescription> worlds{participant, wire::topics::kPoolWorld};
+  wire::Writer<BatchControl> controls{participant, wire::topics::kPoolControl};
+  std::unique_ptr<wire::Writer<Task>> tasks;
   std::uint64_t worker_id = 0;
   std::uint64_t epoch = 0;
 };
@@ -132,7 +132,7 @@ TEST_F(PoolWire, WorldWhoseHashLiesIsRefused) {
   const Hash claimed{.high = 1, .low = 2};
   announce(claimed, physics_pool::to_yaml(scene));
   Task task = good_task();
-  task.batch().world(convert::to_wire(claimed));
+  task.batch().world(wire::to_wire(claimed));
 
   const TaskResult result = ask(task);
 
@@ -151,7 +151,7 @@ TEST_F(PoolWire, WorldThatIsNoSceneIsRefused) {
   for (const std::string text : {"", "[", "jostle_scene: 1\n", "{a: &x [*x]}"}) {
     announce(hash_of(text), text);
     Task task = good_task();
-    task.batch().world(convert::to_wire(hash_of(text)));
+    task.batch().world(wire::to_wire(hash_of(text)));
     EXPECT_THAT(ask(task).error(), HasSubstr(to_string(hash_of(text)))) << text;
   }
   expect_still_serves();
@@ -160,7 +160,7 @@ TEST_F(PoolWire, WorldThatIsNoSceneIsRefused) {
 TEST_F(PoolWire, TaskWaitsForItsWorld) {
   const Scene late = small_scene(2);
   Task task = good_task();
-  task.batch(convert::to_wire(push_batch(late, 2)));
+  task.batch(wire::to_wire(push_batch(late, 2)));
   tasks->write(task);
   expect_still_serves();  // a task that waits holds up no other
 
@@ -177,7 +177,7 @@ TEST_F(PoolWire, TaskWaitsForItsWorld) {
 
 TEST_F(PoolWire, WorldThatNeverComesIsAnErrorAfterAWhile) {
   Task task = good_task();
-  task.batch().world(convert::to_wire(Hash{.high = 0xfeed, .low = 0xbeef}));
+  task.batch().world(wire::to_wire(Hash{.high = 0xfeed, .low = 0xbeef}));
 
   const TaskResult result = ask(task);
 

@@ -6,11 +6,11 @@
 
 #include <algorithm>
 
-#include "services/dds/core.hpp"
-#include "services/dds/profiles.hpp"
-#include "services/dds/reader.hpp"
-#include "services/dds/topics.hpp"
-#include "services/dds/writer.hpp"
+#include "services/wire/dds/core.hpp"
+#include "services/wire/dds/profiles.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
 #include "tests/support/program_process.hpp"
 #include "tests/support/worker_process.hpp"
 
@@ -50,28 +50,28 @@ Edited edit(const std::string& before, const std::string& after, int n = 1) {
 class Profiles : public ::testing::Test {
  protected:
   void load(const std::string& text) {
-    const auto ok = dds::load_profiles({.path = folder.write("edited.xml", text)});
+    const auto ok = wire::load_profiles({.path = folder.write("edited.xml", text)});
     ASSERT_TRUE(ok) << ok.error().message;
   }
-  ~Profiles() override { EXPECT_TRUE(dds::load_profiles({.path = kShipped})); }
+  ~Profiles() override { EXPECT_TRUE(wire::load_profiles({.path = kShipped})); }
 
   const int domain = test_domain();
-  const dds::Participant participant = dds::Participant::open({.domain = domain}).value();
+  const wire::Participant participant = wire::Participant::open({.domain = domain}).value();
   const TempFolder folder;
 };
 
 TEST_F(Profiles, ShippedOnesOfTopicsSayWhatTheCodeSays) {
-  for (const dds::Qos& kind : dds::kKinds) {
+  for (const Qos& kind : kKinds) {
     SCOPED_TRACE(kind.kind);
     const std::string name(kind.kind);
     DataWriterQos writer, writer_in_file;
-    dds::apply_to_writer(kind, writer);
+    wire::apply_to_writer(kind, writer);
     ASSERT_EQ(participant.core().publisher->get_datawriter_qos_from_profile(name, writer_in_file),
               ReturnCode_t::RETCODE_OK);
     EXPECT_TRUE(writer_in_file == writer);
 
     DataReaderQos reader, reader_in_file;
-    dds::apply(kind, reader);
+    wire::apply(kind, reader);
     ASSERT_EQ(participant.core().subscriber->get_datareader_qos_from_profile(name, reader_in_file),
               ReturnCode_t::RETCODE_OK);
     EXPECT_TRUE(reader_in_file == reader);
@@ -81,7 +81,7 @@ TEST_F(Profiles, ShippedOnesOfTopicsSayWhatTheCodeSays) {
 TEST_F(Profiles, ShippedOnesOfParticipantsSayWhatTheCodeSays) {
   for (const std::string name : {"udp", "shared_memory"}) {
     SCOPED_TRACE(name);
-    DomainParticipantQos built_in = dds::built_in_participant(name).value(), in_file;
+    DomainParticipantQos built_in = wire::built_in_participant(name).value(), in_file;
     ASSERT_EQ(DomainParticipantFactory::get_instance()->get_participant_qos_from_profile(name, in_file),
               ReturnCode_t::RETCODE_OK);
     auto &transports = built_in.transport().user_transports, &in_file_transports = in_file.transport().user_transports;
@@ -107,30 +107,29 @@ TEST_F(Profiles, ShippedOnesOfParticipantsSayWhatTheCodeSays) {
 }
 
 TEST_F(Profiles, EveryTopicIsOfAKindThatTheFileHas) {
-  const auto has = [](const dds::Qos& qos) {
-    return std::ranges::find(dds::kKinds, qos.kind, &dds::Qos::kind) != dds::kKinds.end();
-  };
-  EXPECT_TRUE(has(topics::kTaskGoal.qos) && has(topics::kTaskResult.qos) && has(topics::kRobotStatus.qos) &&
-              has(topics::kPoolWorld.qos) && has(topics::pool_task(1).qos));
+  const auto has = [](const Qos& qos) { return std::ranges::find(kKinds, qos.kind, &Qos::kind) != kKinds.end(); };
+  EXPECT_TRUE(has(wire::topics::kTaskGoal.qos) && has(wire::topics::kTaskResult.qos) &&
+              has(wire::topics::kRobotStatus.qos) && has(wire::topics::kPoolWorld.qos) &&
+              has(wire::topics::pool_task(1).qos));
 }
 
 TEST_F(Profiles, BuffersAreThoseThatTheSysctlFileSets) {
   const std::string sysctl = contents(JOSTLE_SOURCE_DIR "/deploy/sysctl/60-jostle.conf");
   const auto udp = std::dynamic_pointer_cast<UDPv4TransportDescriptor>(
-      dds::built_in_participant("udp")->transport().user_transports.front());
+      wire::built_in_participant("udp")->transport().user_transports.front());
   EXPECT_THAT(sysctl, HasSubstr(fmt::format("net.core.rmem_max = {}\n", udp->receiveBufferSize)));
   EXPECT_THAT(sysctl, HasSubstr(fmt::format("net.core.wmem_max = {}\n", udp->sendBufferSize)));
 }
 
 // The ids of what a late reader of a latched topic gets of samples "0" to "4".
-std::vector<std::string> kept_of_five(const dds::Participant& participant) {
-  dds::Writer<jostle_msgs::msg::GoalResult> writer(participant, topics::kTaskResult);
+std::vector<std::string> kept_of_five(const wire::Participant& participant) {
+  wire::Writer<jostle_msgs::msg::GoalResult> writer(participant, wire::topics::kTaskResult);
   for (int i = 0; i < 5; ++i) {
     jostle_msgs::msg::GoalResult result;
     result.goal_id(std::to_string(i));
     writer.write(result);
   }
-  dds::Inbox<jostle_msgs::msg::GoalResult> late(participant, topics::kTaskResult, 100);
+  wire::Inbox<jostle_msgs::msg::GoalResult> late(participant, wire::topics::kTaskResult, 100);
   std::vector<std::string> ids;
   while (ids.empty() || ids.back() != "4") {
     const auto result = late.take(in(10s));
@@ -178,7 +177,7 @@ TEST_F(Profiles, EditedBufferSizeIsInForce) {
   load(edit("<receiveBufferSize>4194304</receiveBufferSize>", "<receiveBufferSize>100000</receiveBufferSize>").text);
 
   const auto before = receive_buffers();
-  const auto other = dds::Participant::open({.domain = domain}).value();
+  const auto other = wire::Participant::open({.domain = domain}).value();
   const auto with_other = receive_buffers();
 
   constexpr int kDoubled = 2 * 100000;  // socket(7): the kernel's own room included
@@ -188,11 +187,11 @@ TEST_F(Profiles, EditedBufferSizeIsInForce) {
 
 TEST_F(Profiles, SharedMemoryCarriesLargeSamples) {
   setenv("JOSTLE_DDS_TRANSPORT", "shared_memory", 1);
-  const auto other = dds::Participant::open({.domain = domain});
+  const auto other = wire::Participant::open({.domain = domain});
   unsetenv("JOSTLE_DDS_TRANSPORT");
   ASSERT_TRUE(other) << other.error().message;
-  dds::Inbox<jostle_msgs::msg::Goal> goals(*other, topics::kTaskGoal, 1);
-  dds::Writer<jostle_msgs::msg::Goal> writer(*other, topics::kTaskGoal);
+  wire::Inbox<jostle_msgs::msg::Goal> goals(*other, wire::topics::kTaskGoal, 1);
+  wire::Writer<jostle_msgs::msg::Goal> writer(*other, wire::topics::kTaskGoal);
   jostle_msgs::msg::Goal goal;
   goal.execution_scene(std::string(1 << 20, 'x'));
   ASSERT_TRUE(writer.wait_for_readers(in(10s)));
@@ -204,7 +203,7 @@ TEST_F(Profiles, SharedMemoryCarriesLargeSamples) {
 
 TEST_F(Profiles, TransportThatNobodyDefinesIsRefused) {
   setenv("JOSTLE_DDS_TRANSPORT", "carrier_pigeon", 1);
-  const auto result = dds::Participant::open({.domain = domain});
+  const auto result = wire::Participant::open({.domain = domain});
   unsetenv("JOSTLE_DDS_TRANSPORT");
 
   ASSERT_FALSE(result);
@@ -227,12 +226,12 @@ TEST_P(BrokenProfiles, AreNamedWithLineGotAndWanted) {
   const Edited edited = edit(mistake.before, mistake.after);
   const std::string file = folder.write("broken.xml", edited.text);
 
-  const auto result = dds::load_profiles({.path = file});
+  const auto result = wire::load_profiles({.path = file});
 
   ASSERT_FALSE(result);
   EXPECT_THAT(result.error().message,
               HasSubstr(fmt::format("{}:{}: {}", file, edited.line + mistake.lines_later, mistake.message)));
-  EXPECT_TRUE(dds::load_profiles({.path = kShipped})) << "one that is whole";
+  EXPECT_TRUE(wire::load_profiles({.path = kShipped})) << "one that is whole";
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -279,7 +278,7 @@ TEST(BrokenProfilesOf, SeveralMistakesNameTheFirst) {
     if (line == 0)
       line = 1 + static_cast<int>(std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
   }
-  const auto result = dds::load_profiles({.path = folder.write("broken.xml", text)});
+  const auto result = wire::load_profiles({.path = folder.write("broken.xml", text)});
 
   ASSERT_FALSE(result);
   EXPECT_THAT(result.error().message, HasSubstr(fmt::format("broken.xml:{}: <depth>: got 'x", line)));
@@ -299,7 +298,7 @@ TEST(BrokenProfilesOf, AProgramEndItAsBadInput) {
 }
 
 TEST(MissingProfiles, AreNamed) {
-  const auto result = dds::load_profiles({.path = "/nowhere/profiles.xml"});
+  const auto result = wire::load_profiles({.path = "/nowhere/profiles.xml"});
   ASSERT_FALSE(result);
   EXPECT_THAT(result.error().message, HasSubstr("/nowhere/profiles.xml: cannot be read"));
 }

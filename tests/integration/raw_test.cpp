@@ -5,10 +5,10 @@
 #include <mutex>
 #include <set>
 
-#include "services/dds/endpoint_watch.hpp"
-#include "services/dds/names.hpp"
-#include "services/dds/raw.hpp"
-#include "services/dds/topics.hpp"
+#include "services/wire/dds/endpoint_watch.hpp"
+#include "services/wire/dds/names.hpp"
+#include "services/wire/dds/raw.hpp"
+#include "services/wire/dds/topics.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -18,8 +18,8 @@ using namespace std::chrono_literals;
 using namespace jostle_msgs::msg;
 using ::testing::ElementsAre;
 
-const dds::RawTopic kStatus{"rt/robot/status", "jostle_msgs::msg::dds_::RobotStatus_", dds::kState};
-const dds::RawTopic kNumbers{"rt/numbers", "test_msgs::msg::dds_::Number_", dds::kCommand};
+const wire::RawTopic kStatus{"rt/robot/status", "jostle_msgs::msg::dds_::RobotStatus_", kState};
+const wire::RawTopic kNumbers{"rt/numbers", "test_msgs::msg::dds_::Number_", kCommand};
 
 std::vector<std::byte> number(std::uint8_t value) {
   return {std::byte{0},     std::byte{1}, std::byte{0}, std::byte{0},
@@ -29,7 +29,7 @@ std::vector<std::byte> number(std::uint8_t value) {
 // Keeps what a raw reader gets.
 class Heap {
  public:
-  void put(std::span<const std::byte> bytes, const dds::Origin& origin) {
+  void put(std::span<const std::byte> bytes, const wire::Origin& origin) {
     const std::lock_guard lock(mutex_);
     samples_.emplace_back(bytes.begin(), bytes.end());
     origins_.push_back(origin);
@@ -38,7 +38,7 @@ class Heap {
     const std::lock_guard lock(mutex_);
     return samples_;
   }
-  std::vector<dds::Origin> origins() const {
+  std::vector<wire::Origin> origins() const {
     const std::lock_guard lock(mutex_);
     return origins_;
   }
@@ -46,24 +46,24 @@ class Heap {
  private:
   mutable std::mutex mutex_;
   std::vector<std::vector<std::byte>> samples_;
-  std::vector<dds::Origin> origins_;
+  std::vector<wire::Origin> origins_;
 };
 
 class Raw : public RunFixture {
  protected:
   Raw() {
     const auto note = [this](std::set<std::string>& names) {
-      return [this, &names](const dds::Endpoint& endpoint) {
+      return [this, &names](const wire::Endpoint& endpoint) {
         const std::lock_guard lock(mutex);
-        const auto type = dds::ros_type(endpoint.type);
-        names.insert(fmt::format("{} {} {}{}{}{}", endpoint.kind == dds::Endpoint::Kind::kWriter ? "writes" : "reads",
-                                 dds::ros_topic(endpoint.topic).value_or(endpoint.topic), type.value_or(endpoint.type),
+        const auto type = wire::ros_type(endpoint.type);
+        names.insert(fmt::format("{} {} {}{}{}{}", endpoint.kind == wire::Endpoint::Kind::kWriter ? "writes" : "reads",
+                                 wire::ros_topic(endpoint.topic).value_or(endpoint.topic), type.value_or(endpoint.type),
                                  endpoint.keyed ? " keyed" : "", endpoint.reliable ? " reliable" : "",
                                  endpoint.latched ? " latched" : ""));
       };
     };
-    watch = std::make_shared<dds::EndpointWatch>(note(found), note(gone));
-    participant.emplace(dds::Participant::open({.domain = domain, .watch = watch}).value());
+    watch = std::make_shared<wire::EndpointWatch>(note(found), note(gone));
+    participant.emplace(wire::Participant::open({.domain = domain, .watch = watch}).value());
   }
 
   bool has(const std::set<std::string>& names, const std::string& name) const {
@@ -75,13 +75,13 @@ class Raw : public RunFixture {
 
   mutable std::mutex mutex;  // guards found and gone
   std::set<std::string> found, gone;
-  std::shared_ptr<dds::EndpointWatch> watch;
-  std::optional<dds::Participant> participant;
+  std::shared_ptr<wire::EndpointWatch> watch;
+  std::optional<wire::Participant> participant;
 };
 
 TEST_F(Raw, ReaderGetsTheBytesOfATypedWriter) {
   Heap heap;
-  const dds::RawReader sut(*participant, kStatus, [&](auto bytes, const auto& origin) { heap.put(bytes, origin); });
+  const wire::RawReader sut(*participant, kStatus, [&](auto bytes, const auto& origin) { heap.put(bytes, origin); });
   const auto sim = program("jostle_sim", {easy});
   ASSERT_TRUE(soon(kPatience, [&] { return heap.samples().size() >= 3; })) << sim->err();
 
@@ -90,7 +90,7 @@ TEST_F(Raw, ReaderGetsTheBytesOfATypedWriter) {
   std::memcpy(payload.data, bytes.data(), bytes.size());
   payload.length = payload.max_size;
   RobotStatus status;
-  ASSERT_TRUE(dds::Serializer<RobotStatus>().deserialize(&payload, &status));
+  ASSERT_TRUE(wire::Serializer<RobotStatus>().deserialize(&payload, &status));
   EXPECT_FALSE(status.q().empty());
   EXPECT_EQ(status.q().size(), status.v().size());
   const auto origins = heap.origins();
@@ -107,11 +107,11 @@ TEST_F(Raw, WriterReachesATypedReader) {
   command.sequence_number(1);
   command.velocities({0.05, 0.0, 0.0, 0.0});
   command.duration(0.2);
-  dds::Serializer<VelocityCommand> serializer;
+  wire::Serializer<VelocityCommand> serializer;
   eprosima::fastrtps::rtps::SerializedPayload_t payload(serializer.getSerializedSizeProvider(&command)());
   ASSERT_TRUE(serializer.serialize(&command, &payload));
-  dds::RawWriter sut(*participant, {"rt/robot/command", serializer.getName(), dds::kCommand});
-  dds::Inbox<RobotStatus> statuses(*participant, topics::kRobotStatus, 64);
+  wire::RawWriter sut(*participant, {"rt/robot/command", serializer.getName(), kCommand});
+  wire::Inbox<RobotStatus> statuses(*participant, wire::topics::kRobotStatus, 64);
   const auto sim = program("jostle_sim", {easy});
   ASSERT_TRUE(sut.wait_for_readers(in(kPatience)));
 
@@ -124,13 +124,13 @@ TEST_F(Raw, WriterReachesATypedReader) {
 }
 
 TEST_F(Raw, RetainedSamplesComeToALateReaderInOrder) {
-  dds::RawWriter writer(*participant, kNumbers);
+  wire::RawWriter writer(*participant, kNumbers);
   for (std::uint8_t i = 1; i <= 3; ++i) ASSERT_TRUE(writer.write(number(i)));
   EXPECT_FALSE(writer.write({}));
   Heap heap;
 
-  const dds::RawReader sut(*participant, {kNumbers.name, kNumbers.type, {.latched = true, .depth = dds::kKeepAll}},
-                           [&](auto bytes, const auto& origin) { heap.put(bytes, origin); });
+  const wire::RawReader sut(*participant, {kNumbers.name, kNumbers.type, {.latched = true, .depth = kKeepAll}},
+                            [&](auto bytes, const auto& origin) { heap.put(bytes, origin); });
 
   ASSERT_TRUE(soon(kPatience, [&] { return heap.samples().size() == 3; }));
   EXPECT_THAT(heap.samples(), ElementsAre(number(1), number(2), number(3)));
@@ -138,9 +138,9 @@ TEST_F(Raw, RetainedSamplesComeToALateReaderInOrder) {
 }
 
 TEST_F(Raw, ReaderCountsWritersThatOfferTooLittle) {
-  const dds::RawWriter writer(*participant, {kNumbers.name, kNumbers.type, {}});
-  const dds::RawReader sut(*participant, {kNumbers.name, kNumbers.type, {.latched = true, .depth = dds::kKeepAll}},
-                           [](auto, const auto&) {});
+  const wire::RawWriter writer(*participant, {kNumbers.name, kNumbers.type, {}});
+  const wire::RawReader sut(*participant, {kNumbers.name, kNumbers.type, {.latched = true, .depth = kKeepAll}},
+                            [](auto, const auto&) {});
 
   EXPECT_TRUE(soon(kPatience, [&] { return sut.troubles().incompatible == 1; }));
   EXPECT_EQ(sut.troubles().lost, 0u);
@@ -149,23 +149,23 @@ TEST_F(Raw, ReaderCountsWritersThatOfferTooLittle) {
 
 TEST_F(Raw, KeyedTypesAreTakenWhereTheKeyCanBeFound) {
   const std::string world = "jostle_msgs::msg::dds_::WorldDescription_";
-  EXPECT_TRUE(dds::can_be_raw(world, true));
-  EXPECT_FALSE(dds::can_be_raw(world, false));
-  EXPECT_TRUE(dds::can_be_raw(kNumbers.type, false));
-  EXPECT_FALSE(dds::can_be_raw(kNumbers.type, true));
+  EXPECT_TRUE(wire::can_be_raw(world, true));
+  EXPECT_FALSE(wire::can_be_raw(world, false));
+  EXPECT_TRUE(wire::can_be_raw(kNumbers.type, false));
+  EXPECT_FALSE(wire::can_be_raw(kNumbers.type, true));
   const auto run_of =
       program("jostle_run", {easy, "--parameters", plain, "--plan-only", "--headless", "--workers", "1"});
   Heap heap;
-  const dds::RawReader sut(*participant, {topics::kPoolWorld.name, world, topics::kPoolWorld.qos},
-                           [&](auto bytes, const auto& origin) { heap.put(bytes, origin); });
+  const wire::RawReader sut(*participant, {wire::topics::kPoolWorld.name, world, wire::topics::kPoolWorld.qos},
+                            [&](auto bytes, const auto& origin) { heap.put(bytes, origin); });
 
   EXPECT_TRUE(soon(kPatience, [&] { return !heap.samples().empty(); })) << run_of->err();
 }
 
 TEST_F(Raw, ATypeIsEitherRawOrTypedInAParticipant) {
-  const dds::Writer<RobotStatus> typed(*participant, topics::kRobotStatus);
+  const wire::Writer<RobotStatus> typed(*participant, wire::topics::kRobotStatus);
 
-  EXPECT_THROW(dds::RawReader(*participant, kStatus, [](auto, const auto&) {}), dds::SetupError);
+  EXPECT_THROW(wire::RawReader(*participant, kStatus, [](auto, const auto&) {}), wire::SetupError);
 }
 
 TEST_F(Raw, WatchNamesEndpointsThatComeAndGo) {

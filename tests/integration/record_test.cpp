@@ -10,11 +10,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "services/bag/folder_reader.hpp"
-#include "services/dds/core.hpp"
-#include "services/dds/names.hpp"
-#include "services/dds/raw.hpp"
-#include "services/dds/topics.hpp"
+#include "services/bags/format/folder_reader.hpp"
+#include "services/wire/dds/core.hpp"
+#include "services/wire/dds/names.hpp"
+#include "services/wire/dds/raw.hpp"
+#include "services/wire/dds/topics.hpp"
 #include "tests/support/bags.hpp"
 #include "tests/support/run_fixture.hpp"
 
@@ -30,8 +30,8 @@ using ::testing::IsSupersetOf;
 using ::testing::Not;
 using ::testing::UnorderedElementsAre;
 
-constexpr dds::Qos kDeep{.depth = 5000};  // holds whatever a test sends
-constexpr dds::Qos kDeepRetained{.retained = true, .depth = 5000};
+constexpr Qos kDeep{.depth = 5000};  // holds whatever a test sends
+constexpr Qos kDeepRetained{.retained = true, .depth = 5000};
 
 // Number i as text. With its end a multiple of four bytes long, as all on the wire is.
 std::string text(int i, std::size_t size = 7) {
@@ -44,10 +44,10 @@ std::string text(int i, std::size_t size = 7) {
 // those of a string whatever the type: a recorder does not look into them.
 class Publisher {
  public:
-  Publisher(int domain, const std::string& topic, const dds::Qos& qos,
+  Publisher(int domain, const std::string& topic, const Qos& qos,
             const std::string& type = "sensor_msgs/msg/JointState")
-      : participant_(dds::Participant::open({.domain = domain}).value()),
-        writer_(participant_, {dds::wire_topic(topic), *dds::wire_type(type), qos}) {}
+      : participant_(wire::Participant::open({.domain = domain}).value()),
+        writer_(participant_, {wire::wire_topic(topic), *wire::wire_type(type), qos}) {}
 
   bool is_heard(int readers = 1) const { return writer_.wait_for_readers(in(kPatience), readers); }
 
@@ -61,8 +61,8 @@ class Publisher {
   int sent = 0;
 
  private:
-  dds::Participant participant_;
-  dds::RawWriter writer_;
+  wire::Participant participant_;
+  wire::RawWriter writer_;
 };
 
 class Record : public RunFixture {
@@ -82,8 +82,9 @@ class Record : public RunFixture {
 
   std::string bag(const std::string& suffix = "") const { return (folder.path() / "bag").string() + suffix; }
 
-  std::vector<bag::Message> messages_of(const std::string& topic, const std::string& path, bool recover = false) const {
-    const auto reader = taken(bag::open_bag(path, recover));
+  std::vector<bags::Message> messages_of(const std::string& topic, const std::string& path,
+                                         bool recover = false) const {
+    const auto reader = taken(bags::open_bag(path, recover));
     const auto index = reader->find_topic(topic);
     if (!index) return {};
     reader->seek(0, {*index});
@@ -92,13 +93,13 @@ class Record : public RunFixture {
 
   std::vector<std::string> topics_of(const std::string& path) const {
     std::vector<std::string> names;
-    const auto reader = taken(bag::open_bag(path, false));
+    const auto reader = taken(bags::open_bag(path, false));
     for (const auto& topic : reader->info().topics) names.push_back(topic.topic.name);
     return names;
   }
 
-  std::map<std::string, bag::Note> notes_of(const std::string& path) const {
-    const auto reader = taken(bag::open_bag(path, false));
+  std::map<std::string, bags::Note> notes_of(const std::string& path) const {
+    const auto reader = taken(bags::open_bag(path, false));
     return reader->info().notes;
   }
 
@@ -116,7 +117,7 @@ std::vector<std::string> numbers(int from, int to, std::size_t size = 7) {
 // Of every promise a writer can make, on a topic nobody has heard of before.
 TEST_F(Record, LosesNothingOfAPublisherThatComesWritesAndGoes) {
   record({});
-  const std::pair<const char*, dds::Qos> cases[] = {
+  const std::pair<const char*, Qos> cases[] = {
       {"/volatile", kDeep}, {"/latched", {.latched = true, .depth = 5000}}, {"/retained", kDeepRetained}};
   for (const auto& [topic, qos] : cases) {
     Publisher publisher(domain, topic, qos);
@@ -137,7 +138,7 @@ TEST_F(Record, LosesNothingOfAPublisherThatComesWritesAndGoes) {
 TEST_F(Record, GetsWhatWasWrittenBeforeItCame) {
   Publisher early(domain, "/early", {.retained = true, .depth = 10});
   early.write(30);
-  Publisher status(domain, "/robot/status", dds::kState, "jostle_msgs/msg/RobotStatus");
+  Publisher status(domain, "/robot/status", kState, "jostle_msgs/msg/RobotStatus");
   status.write(3);
 
   record({});
@@ -207,16 +208,16 @@ TEST_F(Record, NamesTypesItDoesNotKnowAndLeavesThemOut) {
 
 TEST_F(Record, NamesTopicsWhoseWriterOffersWhatNobodyTakes) {
   record({"/x", "/y"});
-  const auto participant = dds::Participant::open({.domain = domain}).value();
-  const std::string type = *dds::wire_type("sensor_msgs/msg/JointState");
-  const dds::RawWriter registers(participant, {"rt/z", type, kDeep});
+  const auto participant = wire::Participant::open({.domain = domain}).value();
+  const std::string type = *wire::wire_type("sensor_msgs/msg/JointState");
+  const wire::RawWriter registers(participant, {"rt/z", type, kDeep});
   auto& core = participant.core();
   auto* topic = core.participant->create_topic("rt/x", type, eprosima::fastdds::dds::TOPIC_QOS_DEFAULT);
   ASSERT_TRUE(topic);
   eprosima::fastdds::dds::DataWriterQos exclusive;
   exclusive.ownership().kind = eprosima::fastdds::dds::EXCLUSIVE_OWNERSHIP_QOS;
   ASSERT_TRUE(core.publisher->create_datawriter(topic, exclusive));
-  const dds::RawWriter plain_one(participant, {"rt/y", type, kDeep});  // announced after it
+  const wire::RawWriter plain_one(participant, {"rt/y", type, kDeep});  // announced after it
   ASSERT_TRUE(plain_one.wait_for_readers(in(kPatience)));
 
   ASSERT_EQ(stop_recorder(), 0);
@@ -237,7 +238,7 @@ TEST_F(Record, RingIsWrittenWhenASignalOrAMessageSaysSo) {
   ASSERT_TRUE(recorder->says("wrote " + bag("-1"), kPatience)) << recorder->err();
   x.write(10);
   ASSERT_TRUE(x.was_received());
-  Publisher trigger(domain, "/record/trigger", dds::kTask, "std_msgs/msg/Empty");
+  Publisher trigger(domain, "/record/trigger", kTask, "std_msgs/msg/Empty");
   ASSERT_TRUE(trigger.is_heard());
   trigger.write(1);
   ASSERT_TRUE(recorder->says("wrote " + bag("-2"), kPatience)) << recorder->err();
@@ -285,7 +286,7 @@ TEST_F(Record, SplitsBySizeAndEveryMessageIsThereOnce) {
   ASSERT_EQ(stop_recorder(), 0) << recorder->err();
 
   EXPECT_EQ(messages_of("/x", bag()).size(), 200u);
-  const auto reader = taken(bag::open_bag(bag(), false));
+  const auto reader = taken(bags::open_bag(bag(), false));
   EXPECT_GE(reader->info().files.size(), 2u);
 }
 

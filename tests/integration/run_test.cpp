@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "services/dds/reader.hpp"
-#include "services/dds/topics.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -193,8 +193,8 @@ INSTANTIATE_TEST_SUITE_P(Physics, RunWith,
 
 TEST_F(Run, WorkerStartedByHandJoinsAPlanThatRuns) {
   start_planning();
-  const auto participant = dds::Participant::open({.domain = domain}).value();
-  dds::Inbox<jostle_msgs::msg::Feedback> feedback(participant, topics::kTaskFeedback, 64);
+  const auto participant = wire::Participant::open({.domain = domain}).value();
+  wire::Inbox<jostle_msgs::msg::Feedback> feedback(participant, wire::topics::kTaskFeedback, 64);
 
   const WorkerProcess late(domain);
   const auto started = Clock::now();

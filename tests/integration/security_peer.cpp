@@ -32,8 +32,8 @@
 #include <string>
 #include <vector>
 
-#include "services/dds/joining.hpp"
-#include "services/dds/security.hpp"
+#include "services/wire/dds/joining.hpp"
+#include "services/wire/dds/security.hpp"
 
 namespace {
 time_t behind = 0;  // seconds that this process's wall clock is late
@@ -128,7 +128,7 @@ void protect_unchecked(DomainParticipantQos& qos, const Arguments& arguments) {
   add("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
-// As services/dds sets participants up, so that peers find each other as fast.
+// As services/wire/dds sets participants up, so that peers find each other as fast.
 DomainParticipantQos make_qos() {
   DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
@@ -145,13 +145,13 @@ int run(const Arguments& arguments) {
   Log::RegisterConsumer(std::make_unique<StdoutErrConsumer>());
   DomainParticipantQos qos = make_qos();
   if (!arguments.secure.empty()) {
-    if (auto ok = dds::secure(qos, arguments.secure); !ok) {
+    if (auto ok = wire::secure(qos, arguments.secure); !ok) {
       std::fprintf(stderr, "%s\n", ok.error().message.c_str());
       return 2;
     }
   }
   if (!arguments.raw.empty()) protect_unchecked(qos, arguments);
-  const dds::Joined joined = dds::join(arguments.domain, qos, {});
+  const wire::Joined joined = wire::join(arguments.domain, qos, {});
   DomainParticipant* participant = joined.participant;
   if (!participant) {
     std::printf("refused participant\n");

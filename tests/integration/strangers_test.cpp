@@ -17,9 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
-using security::Role;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using wire::Role;
 
 constexpr auto kPatience = 60s;
 const std::string kCommand = "rt/robot/command";
@@ -150,25 +150,25 @@ TEST_F(Strangers, WhoseIdentityExpiredAreKeptApartWhateverTheirClocksSay) {
   // The authority must have been there a fortnight ago, too: an older one takes its place.
   const std::time_t now = std::time(nullptr);
   constexpr std::time_t kDay = 86'400;
-  const security::Authority authority = security::make_authority("Jostle CA old", {now - 90 * kDay, now + 90 * kDay});
+  const wire::Authority authority = wire::make_authority("Jostle CA old", {now - 90 * kDay, now + 90 * kDay});
   for (const fs::path& place : {arm, other_arm, fs::path(one[1]), fs::path(two[1])}) {
     const bool is_old = place != arm && place != other_arm;
-    const security::Period period{now - 30 * kDay, is_old ? now - 7 * kDay : now + 30 * kDay};
-    const security::Key key = security::make_key();
-    const auto certificate = security::make_certificate(authority, *key, {place.filename().string(), "robot"},
-                                                        security::make_serial(), period);
-    security::Grant grant = full_grant(security::name_of(X509_get_subject_name(certificate.get())));
+    const wire::Period period{now - 30 * kDay, is_old ? now - 7 * kDay : now + 30 * kDay};
+    const wire::Key key = wire::make_key();
+    const auto certificate =
+        wire::make_certificate(authority, *key, {place.filename().string(), "robot"}, wire::make_serial(), period);
+    wire::Grant grant = full_grant(wire::name_of(X509_get_subject_name(certificate.get())));
     grant.validity = period;
     const auto sign = [&](const std::string& text) {
-      return security::sign_text(*authority.certificate, *authority.key, text);
+      return wire::sign_text(*authority.certificate, *authority.key, text);
     };
-    overwrite(place / "ca.pem", security::to_pem(*authority.certificate));
-    overwrite(place / "cert.pem", security::to_pem(*certificate));
-    overwrite(place / "key.pem", security::to_pem(*key));
-    overwrite(place / "governance.p7s", sign(security::governance_text()));
-    overwrite(place / "permissions.p7s", sign(security::permissions_text(grant)));
+    overwrite(place / "ca.pem", wire::to_pem(*authority.certificate));
+    overwrite(place / "cert.pem", wire::to_pem(*certificate));
+    overwrite(place / "key.pem", wire::to_pem(*key));
+    overwrite(place / "governance.p7s", sign(wire::governance_text()));
+    overwrite(place / "permissions.p7s", sign(wire::permissions_text(grant)));
     overwrite(place / "crl.pem",
-              security::to_pem(*security::make_revocation_list(authority, {}, {now - 30 * kDay, now + 30 * kDay})));
+              wire::to_pem(*wire::make_revocation_list(authority, {}, {now - 30 * kDay, now + 30 * kDay})));
   }
   for (Words* words : {&one, &two}) words->insert(words->end(), fortnight_ago.begin(), fortnight_ago.end());
 
@@ -177,7 +177,7 @@ TEST_F(Strangers, WhoseIdentityExpiredAreKeptApartWhateverTheirClocksSay) {
 
 TEST_F(Strangers, WhoseIdentityWasRevokedAreRefusedByUsAndByFastDds) {
   const fs::path lost = lab.issue("lost", Role::kRobot);
-  ASSERT_TRUE(keystore::revoke(lab.folder(), "lost"));
+  ASSERT_TRUE(wire::keystore::revoke(lab.folder(), "lost"));
 
   const auto sut = talker("lost", secure(lost)), raw = talker("raw", {"--raw", lost.string()});
 
@@ -189,7 +189,7 @@ TEST_F(Strangers, WhoseIdentityWasRevokedAreRefusedByUsAndByFastDds) {
 // A thief does not read the list of stolen identities.
 TEST_F(Strangers, WhoseIdentityWasRevokedAreKeptApartThoughTheyIgnoreTheList) {
   const fs::path one = lab.issue("lost", Role::kRobot), two = lab.issue("stolen", Role::kRobot);
-  for (const char* name : {"lost", "stolen"}) ASSERT_TRUE(keystore::revoke(lab.folder(), name));
+  for (const char* name : {"lost", "stolen"}) ASSERT_TRUE(wire::keystore::revoke(lab.folder(), name));
 
   expect_apart({"--raw", one.string(), "--no-crl"}, {"--raw", two.string(), "--no-crl"});
 }
@@ -200,7 +200,7 @@ TEST_F(Strangers, WhoseIdentityWasRevokedAreHeardByWhoHasAnOldList) {
   const fs::path lost = lab.issue("lost", Role::kRobot);
   const fs::path copy = folder.path() / "copy of arm";
   fs::copy(arm, copy);
-  ASSERT_TRUE(keystore::revoke(lab.folder(), "lost"));
+  ASSERT_TRUE(wire::keystore::revoke(lab.folder(), "lost"));
 
   const auto careless = talker("careless", secure(copy)), thief = talker("thief", {"--raw", lost.string(), "--no-crl"});
 
@@ -209,16 +209,15 @@ TEST_F(Strangers, WhoseIdentityWasRevokedAreHeardByWhoHasAnOldList) {
 
 // An insider who writes himself permissions, and makes his own side believe them.
 TEST_F(Strangers, WithPermissionsOfTheirOwnMakingAreKeptApart) {
-  const security::Authority rogue =
-      security::make_authority("Rogue", {std::time(nullptr) - 86'400, std::time(nullptr) + 86'400});
+  const wire::Authority rogue =
+      wire::make_authority("Rogue", {std::time(nullptr) - 86'400, std::time(nullptr) + 86'400});
   const std::string both =
-      folder.write("both.pem", contents(lab.folder() / "ca" / "ca.pem") + security::to_pem(*rogue.certificate));
+      folder.write("both.pem", contents(lab.folder() / "ca" / "ca.pem") + wire::to_pem(*rogue.certificate));
   std::vector<Words> credentials;
   for (const char* name : {"helper", "other-helper"}) {
     const fs::path identity = lab.issue(name, Role::kWorker);
-    overwrite(identity / "permissions.p7s",
-              security::sign_text(*rogue.certificate, *rogue.key,
-                                  security::permissions_text(full_grant(subject_of(identity)))));
+    overwrite(identity / "permissions.p7s", wire::sign_text(*rogue.certificate, *rogue.key,
+                                                            wire::permissions_text(full_grant(subject_of(identity)))));
     credentials.push_back({"--raw", identity.string(), "--permissions-ca", both});
   }
 
@@ -227,10 +226,9 @@ TEST_F(Strangers, WithPermissionsOfTheirOwnMakingAreKeptApart) {
 
 TEST_F(Strangers, CannotSignPermissionsWithTheirCertificate) {
   const fs::path helper = lab.issue("helper", Role::kWorker);
-  const auto certificate = sure(security::load_certificate(helper / "cert.pem"));
-  overwrite(helper / "permissions.p7s",
-            security::sign_text(*certificate, *sure(security::load_key(helper / "key.pem")),
-                                security::permissions_text(full_grant(subject_of(helper)))));
+  const auto certificate = sure(wire::load_certificate(helper / "cert.pem"));
+  overwrite(helper / "permissions.p7s", wire::sign_text(*certificate, *sure(wire::load_key(helper / "key.pem")),
+                                                        wire::permissions_text(full_grant(subject_of(helper)))));
 
   const auto sut = talker("helper", {"--raw", helper.string()});
 
@@ -276,11 +274,11 @@ TEST_F(Roles, WorkerDoesItsPoolTopicsAndNoOthers) {
 // leaves robots' topics open. The robots judge by their own governance and its permissions.
 TEST_F(Roles, WorkerThatDisarmsItsOwnSideIsStillRefusedByRobots) {
   const fs::path helper = lab.issue("helper", Role::kWorker);
-  const security::Authority rogue =
-      security::make_authority("Rogue", {std::time(nullptr) - 86'400, std::time(nullptr) + 86'400});
+  const wire::Authority rogue =
+      wire::make_authority("Rogue", {std::time(nullptr) - 86'400, std::time(nullptr) + 86'400});
   const std::string both =
-      folder.write("both.pem", contents(lab.folder() / "ca" / "ca.pem") + security::to_pem(*rogue.certificate));
-  std::string governance = security::governance_text();
+      folder.write("both.pem", contents(lab.folder() / "ca" / "ca.pem") + wire::to_pem(*rogue.certificate));
+  std::string governance = wire::governance_text();
   const std::size_t begin = governance.find("<topic_rule>"), end = governance.find("</topic_access_rules>");
   std::string open = governance.substr(begin, end - begin);
   const auto change = [](std::string& text, const std::string& from, const std::string& to) {
@@ -291,7 +289,7 @@ TEST_F(Roles, WorkerThatDisarmsItsOwnSideIsStillRefusedByRobots) {
   change(open, "read_access_control>true<", "read_access_control>false<");
   change(open, "write_access_control>true<", "write_access_control>false<");
   governance.insert(begin, open);
-  overwrite(helper / "governance.p7s", security::sign_text(*rogue.certificate, *rogue.key, governance));
+  overwrite(helper / "governance.p7s", wire::sign_text(*rogue.certificate, *rogue.key, governance));
 
   Peer robot(folder, "robot", secure(arm), {kTask, kCommand}, {kResult, kCommand});
   Peer other(folder, "other", secure(other_arm), {kCommand}, {});

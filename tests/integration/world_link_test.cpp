@@ -5,10 +5,10 @@
 
 #include <functional>
 
-#include "services/dds/reader.hpp"
-#include "services/dds/topics.hpp"
-#include "services/world_link/messages.hpp"
-#include "services/world_link/world_client.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/world/link/messages.hpp"
+#include "services/world/link/world_client.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -16,18 +16,18 @@ namespace {
 
 using namespace std::chrono_literals;
 using namespace jostle_msgs::msg;
-using services::ObjectsClient;
-using services::RobotClient;
 using ::testing::HasSubstr;
+using world::ObjectsClient;
+using world::RobotClient;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr services::WorldClientOptions kImpatient{.silence = 300ms, .start = 500ms};
+constexpr world::WorldClientOptions kImpatient{.silence = 300ms, .start = 500ms};
 
 class WorldLink : public RunFixture {
  protected:
   auto deadline() const { return std::chrono::steady_clock::now() + kPatience; }
 
-  const dds::Participant participant = dds::Participant::open({.domain = domain}).value();
+  const wire::Participant participant = wire::Participant::open({.domain = domain}).value();
 };
 
 // A world that is only what a test says.
@@ -39,11 +39,11 @@ class MadeUpWorld : public WorldLink {
   }
 
   ObjectStates good_states() {
-    return services::to_message({{.name = "target", .position = {1, 2, 3}, .orientation = {1, 0, 0, 0}}}, 0.5);
+    return world::to_message({{.name = "target", .position = {1, 2, 3}, .orientation = {1, 0, 0, 0}}}, 0.5);
   }
 
-  dds::Writer<ObjectStates> objects_writer{participant, topics::kObjectStates};
-  dds::Writer<RobotStatus> status_writer{participant, topics::kRobotStatus};
+  wire::Writer<ObjectStates> objects_writer{participant, wire::topics::kObjectStates};
+  wire::Writer<RobotStatus> status_writer{participant, wire::topics::kRobotStatus};
   RobotClient robot{participant, kImpatient};
   ObjectsClient objects{participant, robot, kImpatient};
 };
@@ -141,8 +141,8 @@ class SimulatedWorldProcess : public WorldLink {
   }
 
   const std::unique_ptr<ProgramProcess> sim = program("jostle_sim", {easy});
-  dds::Inbox<RobotStatus> statuses{participant, topics::kRobotStatus, 64};
-  dds::Writer<VelocityCommand> commands{participant, topics::kRobotCommand};
+  wire::Inbox<RobotStatus> statuses{participant, wire::topics::kRobotStatus, 64};
+  wire::Writer<VelocityCommand> commands{participant, wire::topics::kRobotCommand};
 };
 
 TEST_F(SimulatedWorldProcess, RefusesBadCommandsByFieldAndTakesTheNextGoodOne) {
@@ -257,9 +257,9 @@ class CoordinatorProcess : public WorldLink {
   const std::unique_ptr<ProgramProcess> sim = program("jostle_sim", {easy});
   const std::unique_ptr<ProgramProcess> coordinator =
       program("jostle_coordinator", {"--pool", "threads", "--threads", "1"});
-  dds::Writer<Goal> goals{participant, topics::kTaskGoal};
-  dds::Writer<Cancel> cancels{participant, topics::kTaskCancel};
-  dds::Inbox<GoalResult> results{participant, topics::kTaskResult, 64};
+  wire::Writer<Goal> goals{participant, wire::topics::kTaskGoal};
+  wire::Writer<Cancel> cancels{participant, wire::topics::kTaskCancel};
+  wire::Inbox<GoalResult> results{participant, wire::topics::kTaskResult, 64};
 };
 
 TEST_F(CoordinatorProcess, AnswersBadGoalsWithTheFieldAndGoesOnServing) {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "services/bag/bag_reader.hpp"
-#include "services/bag/bag_writer.hpp"
+#include "services/bags/format/bag_reader.hpp"
+#include "services/bags/format/bag_writer.hpp"
 
 namespace jostle::tests {
 
@@ -43,7 +43,7 @@ inline Bytes noise(std::size_t size, std::uint64_t seed) {
   return bytes;
 }
 
-inline bag::Topic string_topic(const std::string& name, const dds::Qos& qos = {}) {
+inline bags::Topic string_topic(const std::string& name, const Qos& qos = {}) {
   return {.name = name, .type = "std_msgs/msg/String", .qos = qos, .definition = "string data\n"};
 }
 
@@ -57,15 +57,15 @@ inline void taken(const Result<void>& result) {
 }
 
 /// What is left to read. Throws what next() fails with.
-inline std::vector<bag::Message> rest_of(bag::BagReader& reader) {
-  std::vector<bag::Message> messages;
+inline std::vector<bags::Message> rest_of(bags::BagReader& reader) {
+  std::vector<bags::Message> messages;
   while (auto message = taken(reader.next())) messages.push_back(std::move(*message));
   return messages;
 }
 
-inline std::vector<std::string> texts_of(const std::vector<bag::Message>& messages) {
+inline std::vector<std::string> texts_of(const std::vector<bags::Message>& messages) {
   std::vector<std::string> texts;
-  for (const bag::Message& message : messages) texts.push_back(text_of(message.data));
+  for (const bags::Message& message : messages) texts.push_back(text_of(message.data));
   return texts;
 }
 

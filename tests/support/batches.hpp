@@ -8,7 +8,7 @@
 
 #include "idl/types/hash.hpp"
 #include "physics_pool/api/pool.hpp"
-#include "physics_pool/scene/generate.hpp"
+#include "physics_pool/scenarios/chapter3.hpp"
 
 namespace jostle::tests {
 

@@ -9,9 +9,9 @@
 #include <fstream>
 #include <string>
 
-#include "services/security/documents.hpp"
-#include "services/security/keystore.hpp"
-#include "services/security/pki.hpp"
+#include "services/wire/security/documents.hpp"
+#include "services/wire/security/keystore.hpp"
+#include "services/wire/security/pki.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace jostle::tests {
@@ -31,24 +31,23 @@ inline void overwrite(const std::filesystem::path& file, const std::string& text
 class Lab {
  public:
   explicit Lab(const std::filesystem::path& folder) : folder_(folder) {
-    const auto ok = keystore::create(folder_);
+    const auto ok = wire::keystore::create(folder_);
     if (!ok) throw std::runtime_error(ok.error().message);
   }
 
   const std::filesystem::path& folder() const { return folder_; }
 
-  std::filesystem::path issue(const std::string& name, security::Role role, int days = 30) const {
-    return sure(keystore::issue(folder_, name, role, std::chrono::days(days)));
+  std::filesystem::path issue(const std::string& name, wire::Role role, int days = 30) const {
+    return sure(wire::keystore::issue(folder_, name, role, std::chrono::days(days)));
   }
 
-  security::Authority authority() const {
-    return {sure(security::load_certificate(folder_ / "ca" / "ca.pem")),
-            sure(security::load_key(folder_ / "ca" / "ca.key"))};
+  wire::Authority authority() const {
+    return {sure(wire::load_certificate(folder_ / "ca" / "ca.pem")), sure(wire::load_key(folder_ / "ca" / "ca.key"))};
   }
 
   std::string signed_by_authority(const std::string& text) const {
-    const security::Authority signer = authority();
-    return security::sign_text(*signer.certificate, *signer.key, text);
+    const wire::Authority signer = authority();
+    return wire::sign_text(*signer.certificate, *signer.key, text);
   }
 
  private:
@@ -57,16 +56,15 @@ class Lab {
 
 /// Subject of an identity's certificate.
 inline std::string subject_of(const std::filesystem::path& identity) {
-  return security::name_of(X509_get_subject_name(sure(security::load_certificate(identity / "cert.pem")).get()));
+  return wire::name_of(X509_get_subject_name(sure(wire::load_certificate(identity / "cert.pem")).get()));
 }
 
 /// Permissions for everything, from yesterday until in a month.
-inline security::Grant full_grant(const std::string& subject) {
+inline wire::Grant full_grant(const std::string& subject) {
   constexpr std::time_t kDay = 86'400;
   const std::time_t now = std::time(nullptr);
-  return {.subject = subject,
-          .validity = {now - 2 * kDay, now + 30 * kDay},
-          .rights = security::rights_of(security::Role::kRobot)};
+  return {
+      .subject = subject, .validity = {now - 2 * kDay, now + 30 * kDay}, .rights = wire::rights_of(wire::Role::kRobot)};
 }
 
 }  // namespace jostle::tests

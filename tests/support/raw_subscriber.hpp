@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "services/dds/names.hpp"
-#include "services/dds/raw.hpp"
+#include "services/wire/dds/names.hpp"
+#include "services/wire/dds/raw.hpp"
 #include "tests/support/bags.hpp"
 
 namespace jostle::tests {
@@ -15,10 +15,10 @@ namespace jostle::tests {
 /// Of a topic as ROS 2 names it.
 class RawSubscriber {
  public:
-  RawSubscriber(const dds::Participant& participant, const std::string& topic,
-                const std::string& type = "std_msgs/msg/String", const dds::Qos& qos = {.depth = dds::kKeepAll})
-      : reader_(participant, {dds::wire_topic(topic), dds::wire_type(type).value(), qos},
-                [this](std::span<const std::byte> sample, const dds::Origin&) {
+  RawSubscriber(const wire::Participant& participant, const std::string& topic,
+                const std::string& type = "std_msgs/msg/String", const Qos& qos = {.depth = kKeepAll})
+      : reader_(participant, {wire::wire_topic(topic), wire::wire_type(type).value(), qos},
+                [this](std::span<const std::byte> sample, const wire::Origin&) {
                   const std::lock_guard lock(mutex_);
                   samples_.emplace_back(sample.begin(), sample.end());
                 }) {}
@@ -42,7 +42,7 @@ class RawSubscriber {
  private:
   mutable std::mutex mutex_;  // guards samples_
   std::vector<Bytes> samples_;
-  dds::RawReader reader_;  // last: stops before what it fills is gone
+  wire::RawReader reader_;  // last: stops before what it fills is gone
 };
 
 }  // namespace jostle::tests

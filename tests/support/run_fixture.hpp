@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "physics_pool/scene/generate.hpp"
 #include "tests/support/program_process.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/support/worker_process.hpp"

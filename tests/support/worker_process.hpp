@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/support/domain_claim.hpp"
+#include "services/common/process/domain_claim.hpp"
 
 namespace jostle::tests {
 
@@ -29,7 +29,7 @@ Clock::time_point in(Duration time) {
 
 /// A DDS domain that no other test process on this machine uses; held until this one ends.
 inline int test_domain() {
-  static const auto own_result = services::claim_some_domain();
+  static const auto own_result = common::claim_some_domain();
   if (!own_result) throw std::runtime_error(own_result.error().message);
   return own_result->domain;
 }

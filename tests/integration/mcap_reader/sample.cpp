@@ -4,14 +4,14 @@
 #include <cstring>
 #include <string>
 
-#include "services/bag/bag_writer.hpp"
-#include "services/bag/definitions.hpp"
+#include "services/bags/format/bag_writer.hpp"
+#include "services/bags/format/definitions.hpp"
 
 namespace {
 
 using namespace jostle;
 
-constexpr bag::Time kBegin = 1'700'000'000'000'000'000;
+constexpr bags::Time kBegin = 1'700'000'000'000'000'000;
 constexpr int kCount = 50'000;  // 5 ms apart: several chunks
 
 std::vector<std::byte> bytes_of(const std::vector<double>& values) {
@@ -21,28 +21,28 @@ std::vector<std::byte> bytes_of(const std::vector<double>& values) {
   return bytes;
 }
 
-bag::Topic topic(const std::string& name, const std::string& type, const dds::Qos& qos) {
-  return {.name = name, .type = type, .qos = qos, .definition = bag::definition_of(type).value()};
+bags::Topic topic(const std::string& name, const std::string& type, const Qos& qos) {
+  return {.name = name, .type = type, .qos = qos, .definition = bags::definition_of(type).value()};
 }
 
 Result<void> write(const std::string& folder, const std::string& kind) {
-  auto writer_result = bag::BagWriter::create(
-      folder, {.storage = kind == "sqlite3" ? bag::BagOptions::Storage::kSqlite : bag::BagOptions::Storage::kMcap,
+  auto writer_result = bags::BagWriter::create(
+      folder, {.storage = kind == "sqlite3" ? bags::BagOptions::Storage::kSqlite : bags::BagOptions::Storage::kMcap,
                .compress = kind != "raw"});
   if (!writer_result) return writer_result.error();
-  bag::BagWriter& writer = **writer_result;
-  const auto pose_result = writer.add_topic(topic("/goal", "geometry_msgs/msg/Pose", dds::kLatched));
+  bags::BagWriter& writer = **writer_result;
+  const auto pose_result = writer.add_topic(topic("/goal", "geometry_msgs/msg/Pose", kLatched));
   if (!pose_result) return pose_result.error();
-  const auto point_result = writer.add_topic(topic("/hand", "geometry_msgs/msg/Point", dds::kStream));
+  const auto point_result = writer.add_topic(topic("/hand", "geometry_msgs/msg/Point", kStream));
   if (!point_result) return point_result.error();
-  const auto unused_result = writer.add_topic(topic("/plan", "jostle_msgs/msg/Plan", dds::kState));
+  const auto unused_result = writer.add_topic(topic("/plan", "jostle_msgs/msg/Plan", kState));
   if (!unused_result) return unused_result.error();
   const auto pose = bytes_of({1, 2, 3, 0, 0, 0, 1});
   if (auto ok = writer.write(*pose_result, {.log_time = kBegin, .publish_time = kBegin - 7, .data = pose}); !ok) {
     return ok;
   }
   for (int i = 0; i < kCount; ++i) {
-    const bag::Time time = kBegin + bag::Time{i} * 5'000'000;
+    const bags::Time time = kBegin + bags::Time{i} * 5'000'000;
     const auto point = bytes_of({static_cast<double>(i), -0.5, 1e-300});
     if (auto ok = writer.write(*point_result, {.log_time = time, .publish_time = time, .data = point}); !ok) return ok;
   }

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "physics_pool/local/engine.hpp"
 #include "physics_pool/local/reduced_simulator.hpp"
 #include "physics_pool/local/simulator.hpp"
 #include "tests/support/scenes.hpp"

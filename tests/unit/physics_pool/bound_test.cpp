@@ -6,7 +6,7 @@
 
 #include "physics_pool/local/rollout.hpp"
 #include "physics_pool/local/simulator.hpp"
-#include "physics_pool/scene/generate.hpp"
+#include "physics_pool/scenarios/chapter3.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {

@@ -1,4 +1,4 @@
-#include "physics_pool/scene/generate_push.hpp"
+#include "physics_pool/scenarios/push.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "physics_pool/scene/generate.hpp"
+#include "physics_pool/scenarios/chapter3.hpp"
 
 #include <gmock/gmock.h>
 

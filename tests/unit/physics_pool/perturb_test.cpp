@@ -4,7 +4,8 @@
 #include <functional>
 #include <vector>
 
-#include "physics_pool/scene/generate.hpp"
+#include "physics_pool/scenarios/chapter3.hpp"
+#include "physics_pool/uncertainty/belief.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "physics_pool/local/simulator.hpp"
-#include "physics_pool/scene/generate_push.hpp"
+#include "physics_pool/scenarios/push.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {

@@ -1,4 +1,5 @@
 #include "physics_pool/local/reduced_simulator.hpp"
+#include "physics_pool/local/engine.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -8,7 +9,7 @@
 #include <set>
 
 #include "physics_pool/local/simulator.hpp"
-#include "physics_pool/scene/generate.hpp"
+#include "physics_pool/scenarios/chapter3.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {

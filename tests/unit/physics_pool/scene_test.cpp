@@ -7,7 +7,7 @@
 #include <fstream>
 #include <numbers>
 
-#include "physics_pool/scene/generate.hpp"
+#include "physics_pool/scenarios/chapter3.hpp"
 #include "physics_pool/scene/planar_gripper.hpp"
 #include "tests/support/scenes.hpp"
 

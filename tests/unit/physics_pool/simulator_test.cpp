@@ -1,13 +1,14 @@
 // The fine model F against mechanics that one can do by hand.
 
 #include "physics_pool/local/simulator.hpp"
+#include "physics_pool/local/engine.hpp"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <filesystem>
 
-#include "physics_pool/scene/generate.hpp"
+#include "physics_pool/scenarios/chapter3.hpp"
 #include "physics_pool/scene/planar_gripper.hpp"
 #include "tests/support/scenes.hpp"
 

@@ -4,9 +4,9 @@
 
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/local/thread_pool.hpp"
-#include "physics_pool/scene/generate_push.hpp"
+#include "physics_pool/scenarios/push.hpp"
 #include "planners/mpc/mpc.hpp"
-#include "services/simulation/in_process_world.hpp"
+#include "services/world/in_process/in_process_world.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace jostle::planners {
@@ -20,8 +20,8 @@ Outcome pushed(const Scene& scene, const MpcOptions& options) {
   const PbstoOptions planner_options = push_planner_options();
   Pbsto planner(pool, planner_options);
   ExecutionWorld truth(world, 0.0, 1);
-  services::SimulatedRobot robot(truth);
-  services::SimulatedObjects objects(truth, scene);
+  world::SimulatedRobot robot(truth);
+  world::SimulatedObjects objects(truth, scene);
   const ControlSetup setup{.planner = planner,
                            .robot = robot,
                            .objects = objects,

@@ -1,0 +1,25 @@
+#pragma once
+/// \file
+/// Who owns the engine's objects, without the engine's headers: what other rooms include of this
+/// folder stands on this file, and only sources see MuJoCo.
+
+#include <memory>
+
+struct mjModel_;
+struct mjData_;
+
+namespace jostle::physics_pool {
+
+struct ModelDeleter {
+  void operator()(mjModel_* model) const;
+};
+struct DataDeleter {
+  void operator()(mjData_* data) const;
+};
+using ModelPtr = std::unique_ptr<mjModel_, ModelDeleter>;
+using DataPtr = std::unique_ptr<mjData_, DataDeleter>;
+
+/// The version of the MuJoCo library that is loaded, such as "2.2.2".
+const char* engine_version();
+
+}  // namespace jostle::physics_pool

@@ -1,0 +1,33 @@
+#pragma once
+/// \file
+/// Planning worlds made from execution worlds, and what a planner sees of the one in the other.
+
+#include <cstdint>
+
+#include "idl/types/state.hpp"
+#include "physics_pool/scene/scene.hpp"
+#include "physics_pool/uncertainty/levels.hpp"
+
+namespace jostle::physics_pool {
+
+/// The planning world of an execution world: Gaussian noise on poses, sizes,
+/// masses and frictions (footnote 2 of Ch. 3: 5 mm, 0.005 rad, 5 mm, 10 g and
+/// 0.005 at low; twice and three times that at medium and high). What the
+/// thesis calls variances are standard deviations here. Believed objects never
+/// overlap: a draw that would is made again, with less noise after each try, and
+/// if that does not help, everything is.
+Scene perturb(const Scene& execution, Uncertainty level, std::uint64_t seed);
+
+/// What a measurement follows.
+enum class Measurement {
+  kInitial,   ///< nothing has moved: objects are where the planning world has them
+  kFeedback,  ///< an action: poses are exact, shapes remain believed
+};
+
+/// The state of the execution world as the planner sees it. The thesis adds
+/// pose noise when a planning world is made and then observes; its experiments
+/// with noisy tracking are separate ones (Sec. 3.3.3). Every object is as high
+/// above the surface as its believed shape puts it; joints are exact.
+State observed_state(const Scene& execution, const Scene& belief, const State& truth, Measurement measurement);
+
+}  // namespace jostle::physics_pool

@@ -1,0 +1,52 @@
+#pragma once
+/// \file
+/// Definitions of message types as text, and messages decoded by them.
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::bags {
+
+/// What ROS 2 tools want of a type ("geometry_msgs/msg/Pose"): its .msg file and, behind lines
+/// of `=`, those of the types that it is made of. Of every message of idl/msg, whose comments
+/// it keeps; nothing for other types.
+std::optional<std::string> definition_of(const std::string& type);
+
+/// All of those types, sorted.
+std::vector<std::string> known_types();
+
+/// The same from IDL: modules of modules of structs, as idl/msg has them; by type.
+/// Error kInvalidArgument with file name and line.
+Result<std::map<std::string, std::string>> definitions_of_idl(
+    const std::vector<std::pair<std::string_view, std::string_view>>& files);
+
+/// Decodes messages of one type, by its definition.
+///
+/// Threads  safe from any thread.
+class Decoder {
+ public:
+  /// Error kInvalidArgument: malformed, or a part is missing; names type and line.
+  static Result<Decoder> create(const std::string& type, const std::string& definition);
+  Decoder(Decoder&&) noexcept;
+  Decoder& operator=(Decoder&&) noexcept;
+  ~Decoder();
+
+  /// CDR with its four bytes (XCDR1, of either byte order) as an object with fields in their
+  /// order. Numbers that are not finite stay what they are; dump() makes null of them.
+  /// Error kInvalidArgument: other bytes than the type has; says field, got, wanted.
+  Result<nlohmann::ordered_json> decode(std::span<const std::byte> cdr) const;
+
+ private:
+  struct Types;
+  explicit Decoder(std::unique_ptr<Types> types);
+  std::unique_ptr<Types> types_;
+};
+
+}  // namespace jostle::bags

@@ -1,0 +1,23 @@
+#pragma once
+/// \file
+/// An index made of all records of an MCAP file, for want of a summary or to check one.
+
+#include <cstdint>
+
+#include "idl/types/result.hpp"
+#include "services/bags/format/input_file.hpp"
+#include "services/bags/format/mcap_index.hpp"
+
+namespace jostle::bags::mcap {
+
+enum class ScanMode {
+  kRead,     ///< up to the first damage, which is the error
+  kRecover,  ///< steps over damage: FileInfo::damage says what, there is no error
+  kVerify,   ///< as kRead, with a look at what reading does not need
+};
+
+/// Finds blocks, counts and notes anew; definitions come on top of those that `index` has.
+/// `end`: where the footer is, or what is left of the file ends.
+Result<void> scan(const InputFile& file, std::uint64_t end, ScanMode mode, Index& index);
+
+}  // namespace jostle::bags::mcap

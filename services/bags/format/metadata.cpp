@@ -1,0 +1,121 @@
+#include "services/bags/format/metadata.hpp"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "services/bags/format/qos_text.hpp"
+#include "services/common/process/files.hpp"
+
+namespace jostle::bags {
+namespace {
+
+constexpr int kVersion = 5;
+constexpr const char* kRoot = "rosbag2_bagfile_information";
+constexpr const char* kNotes = "jostle_notes";
+// What rosbag2 writes where nothing was recorded.
+constexpr Time kNoTime = std::numeric_limits<Time>::max();
+
+void add_times(YAML::Emitter& out, Time start, Time duration) {
+  out << YAML::Key << "starting_time" << YAML::Value << YAML::BeginMap << YAML::Key << "nanoseconds_since_epoch"
+      << YAML::Value << start << YAML::EndMap;
+  out << YAML::Key << "duration" << YAML::Value << YAML::BeginMap << YAML::Key << "nanoseconds" << YAML::Value
+      << duration << YAML::EndMap;
+}
+
+}  // namespace
+
+std::string metadata_text(const BagMetadata& metadata) {
+  std::uint64_t messages = 0;
+  Time start = kNoTime, end = std::numeric_limits<Time>::min();
+  for (const MetadataEntry& file : metadata.files) {
+    if (file.messages == 0) continue;
+    messages += file.messages;
+    start = std::min(start, file.start);
+    end = std::max(end, file.end);
+  }
+  YAML::Emitter out;
+  out << YAML::BeginMap << YAML::Key << kRoot << YAML::Value << YAML::BeginMap;
+  out << YAML::Key << "version" << YAML::Value << kVersion;
+  out << YAML::Key << "storage_identifier" << YAML::Value << metadata.storage;
+  add_times(out, start, messages == 0 ? 0 : end - start);
+  out << YAML::Key << "message_count" << YAML::Value << messages;
+  out << YAML::Key << "topics_with_message_count" << YAML::Value << YAML::BeginSeq;
+  for (const TopicInfo& topic : metadata.topics) {
+    out << YAML::BeginMap << YAML::Key << "topic_metadata" << YAML::Value << YAML::BeginMap;
+    out << YAML::Key << "name" << YAML::Value << topic.topic.name;
+    out << YAML::Key << "type" << YAML::Value << topic.topic.type;
+    out << YAML::Key << "serialization_format" << YAML::Value << "cdr";
+    out << YAML::Key << "offered_qos_profiles" << YAML::Value << YAML::DoubleQuoted << qos_text(topic.topic.qos);
+    out << YAML::EndMap << YAML::Key << "message_count" << YAML::Value << topic.messages << YAML::EndMap;
+  }
+  out << YAML::EndSeq;
+  out << YAML::Key << "compression_format" << YAML::Value << YAML::DoubleQuoted << "";
+  out << YAML::Key << "compression_mode" << YAML::Value << YAML::DoubleQuoted << "";
+  out << YAML::Key << "relative_file_paths" << YAML::Value << YAML::BeginSeq;
+  for (const MetadataEntry& file : metadata.files) out << file.path;
+  out << YAML::EndSeq;
+  out << YAML::Key << "files" << YAML::Value << YAML::BeginSeq;
+  for (const MetadataEntry& file : metadata.files) {
+    out << YAML::BeginMap << YAML::Key << "path" << YAML::Value << file.path;
+    add_times(out, file.messages == 0 ? kNoTime : file.start, file.messages == 0 ? 0 : file.end - file.start);
+    out << YAML::Key << "message_count" << YAML::Value << file.messages << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::EndMap;
+  if (!metadata.notes.empty()) {
+    out << YAML::Key << kNotes << YAML::Value << YAML::BeginMap;
+    for (const auto& [name, note] : metadata.notes) {
+      out << YAML::Key << name << YAML::Value << YAML::BeginMap;
+      for (const auto& [key, value] : note) {
+        out << YAML::Key << YAML::DoubleQuoted << key << YAML::Value << YAML::DoubleQuoted << value;
+      }
+      out << YAML::EndMap;
+    }
+    out << YAML::EndMap;
+  }
+  out << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+Result<ReadMetadata> read_metadata(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / kMetadataFile;
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) {
+    return Error{Code::kNotFound, fmt::format("{}: not there", file.string())};
+  }
+  auto text_result = common::read_text(file);
+  if (!text_result) return text_result.error();
+  try {
+    const YAML::Node root = YAML::Load(*text_result)[kRoot];
+    if (!root.IsMap()) {
+      return Error{Code::kInvalidArgument, fmt::format("{}: got no {}, wanted rosbag2's", file.string(), kRoot)};
+    }
+    if (const auto compression = root["compression_format"].as<std::string>(""); !compression.empty()) {
+      return Error{
+          Code::kInvalidArgument,
+          fmt::format(
+              "{}: got a bag that rosbag2 compressed ({}, {} mode), wanted plain files; remedy: ros2 bag convert",
+              file.string(), compression, root["compression_mode"].as<std::string>("?"))};
+    }
+    ReadMetadata metadata{.storage = root["storage_identifier"].as<std::string>("")};
+    for (const YAML::Node& path : root["relative_file_paths"]) {
+      // Early versions wrote the bag's folder in front.
+      const std::filesystem::path relative = path.as<std::string>();
+      std::filesystem::path found = folder / relative;
+      if (!std::filesystem::exists(found, ignored)) found = folder / relative.filename();
+      metadata.files.push_back(std::move(found));
+    }
+    if (metadata.files.empty()) {
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}: relative_file_paths: got none, wanted the files of the bag", file.string())};
+    }
+    return metadata;
+  } catch (const YAML::Exception& problem) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: line {}: {}", file.string(), problem.mark.line + 1, problem.msg)};
+  }
+}
+
+}  // namespace jostle::bags

@@ -1,0 +1,94 @@
+#pragma once
+/// \file
+/// One file of a bag: what MCAP and sqlite3 do each in their way. Inside this room only.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "idl/types/result.hpp"
+#include "services/bags/format/bag_reader.hpp"
+#include "services/bags/format/bag_writer.hpp"
+#include "services/bags/format/message.hpp"
+
+namespace jostle::bags {
+
+using Notes = std::map<std::string, Note>;
+
+/// What of a file's messages is in it.
+struct WrittenFile {
+  std::vector<std::uint64_t> messages;  ///< by topic
+  Time start = 0, end = 0;              ///< log times
+};
+
+/// A file that is being written. Topics count from 0 in the order they were added.
+///
+/// Failure  as BagWriter promises: after a failed write the file ends where it was whole,
+///          every further write() returns that error, close() completes what fits.
+class FileWriter {
+ public:
+  virtual ~FileWriter() = default;
+
+  virtual Result<void> add_topic(const Topic& topic) = 0;
+  virtual Result<void> write(int topic, const MessageView& message) = 0;
+  /// `notes`: those that have changed since they were last written to this file.
+  virtual Result<void> flush(const Notes& notes) = 0;
+
+  /// Everything written so far repeats what earlier files hold. Before anything else.
+  virtual Result<void> end_repeated() = 0;
+  virtual Result<void> close(const Notes& notes) = 0;  ///< as flush(), and what ends a file
+
+  virtual std::uint64_t bytes() const = 0;  ///< written or about to be
+  virtual WrittenFile written() const = 0;  ///< handed to the operating system
+};
+
+struct FileInfo {
+  std::vector<TopicInfo> topics;
+  Time start = 0, end = 0;  ///< of its messages
+  std::uint64_t messages = 0;
+  Notes notes;
+  /// What was found damaged; empty unless the file was opened to be recovered.
+  std::vector<std::string> damage;
+};
+
+struct OpenOptions {
+  bool skip_repeated = false;  ///< leave out what repeats earlier files
+  /// Take what is readable; FileInfo::damage says what is not. next() steps over damage, too.
+  bool recover = false;
+};
+
+/// A file that is being read; messages have the file's own topic indices.
+class FileReader {
+ public:
+  virtual ~FileReader() = default;
+
+  virtual const FileInfo& info() const = 0;
+  /// `wanted`: by topic index.
+  virtual void seek(Time from, std::vector<bool> wanted) = 0;
+  virtual Result<std::optional<Message>> next() = 0;
+  virtual Result<std::optional<Message>> last_at(int topic, Time time) = 0;
+
+  /// Reads the whole file for what next() does not look at: checksums and counts of the
+  /// file itself. Error as next().
+  virtual Result<void> verify() = 0;
+};
+
+/// How a kind of file is written and opened.
+struct Storage {
+  const char* name;       ///< as metadata.yaml has it
+  const char* extension;  ///< with its dot
+  Result<std::unique_ptr<FileWriter>> (*create)(const std::filesystem::path& file, const BagOptions& options);
+  Result<std::unique_ptr<FileReader>> (*open)(const std::filesystem::path& file, const OpenOptions& options);
+};
+
+const Storage& mcap_storage();
+const Storage& sqlite_storage();
+const Storage& storage_of(BagOptions::Storage storage);
+/// By a file's ending, or nothing.
+const Storage* storage_of(const std::filesystem::path& file);
+
+}  // namespace jostle::bags

@@ -1,0 +1,71 @@
+#pragma once
+/// \file
+/// Subscriptions: readers of whatever is selected, before and after its writers appear.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "idl/types/result.hpp"
+#include "services/bags/format/message.hpp"
+#include "services/bags/selection.hpp"
+#include "services/wire/dds/reader.hpp"
+
+namespace jostle::bags {
+
+/// Subscribes
+///
+///   to the system's own topics at once, asking for what their writers keep;
+///   to every other topic as soon as a writer or a reader of it is found, and asks for what
+///   the writer offers: one that keeps its last samples is asked for them.
+///
+/// A writer that offers less than the readers so far ask for gets a reader of its own. A sample
+/// that comes to two readers counts once. Says why a topic is left out: a type whose definition
+/// is unknown, a key that cannot be found, two types on one topic. Topics and types that are not
+/// ROS 2's are passed over.
+class Subscriptions {
+ public:
+  struct Options {
+    std::optional<int> domain;
+    Selection selection;
+    /// Text of a type such as "jostle_msgs/msg/Goal", or nothing if it is unknown.
+    std::function<std::optional<std::string>(const std::string& type)> definition;
+    /// On the middleware's threads, maybe several at once. `topic` is an index for topic().
+    std::function<void(int topic, std::span<const std::byte>, const wire::Origin&)> on_sample;
+    /// On a thread of this class.
+    std::function<void(const std::string&)> on_warning;
+  };
+
+  /// Every reader of the system's own topics is there when this returns.
+  /// Errors   of Participant::open, kUnavailable
+  static Result<std::unique_ptr<Subscriptions>> open(Options options);
+  ~Subscriptions();
+
+  const wire::Participant& participant() const;
+
+  int topics() const;
+  /// Name, type, definition, and what its first writer offered.
+  Topic topic(int index) const;
+
+  /// Samples between the first and the last one of each writer that did not come.
+  std::uint64_t missing(int topic) const;
+
+  /// Topics that are written and subscribed to, and no writer of which a reader here could be
+  /// matched with: it offers what nobody asks for, exclusive ownership, say. With the number of
+  /// refusals that the middleware tells of. No topic is subscribed to after this.
+  std::vector<std::pair<std::string, std::uint64_t>> unmatched();
+
+  /// No on_sample follows.
+  void close();
+
+ private:
+  struct Impl;
+  explicit Subscriptions(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace jostle::bags

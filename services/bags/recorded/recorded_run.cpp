@@ -1,0 +1,159 @@
+#include "services/bags/recorded/recorded_run.hpp"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <utility>
+
+#include "services/wire/dds/cdr.hpp"
+
+namespace jostle::bags {
+namespace {
+
+using jostle_msgs::msg::GoalResult;
+using jostle_msgs::msg::Observation;
+using jostle_msgs::msg::Plan;
+using jostle_msgs::msg::TaskRun;
+
+std::vector<int> topics_of(const BagInfo& info) {
+  std::vector<int> topics;
+  for (std::size_t i = 0; i < info.topics.size(); ++i) {
+    const std::string& type = info.topics[i].topic.type;
+    if (type == "jostle_msgs/msg/TaskRun" || type == "jostle_msgs/msg/Observation" || type == "jostle_msgs/msg/Plan" ||
+        type == "jostle_msgs/msg/GoalResult") {
+      topics.push_back(static_cast<int>(i));
+    }
+  }
+  return topics;
+}
+
+std::string names(const BagInfo& info) {
+  std::string text;
+  for (const TopicInfo& topic : info.topics) text += (text.empty() ? "" : ", ") + topic.topic.name;
+  return text.empty() ? "no topics" : text;
+}
+
+// The parts of one run as they come, in any order and some of them twice.
+struct Parts {
+  std::optional<TaskRun> run;
+  std::map<std::uint32_t, std::pair<Observation, Time>> observations;
+  std::map<std::uint32_t, Plan> plans;
+  std::optional<GoalResult> result;
+  Time begin = 0, end = 0;
+};
+
+class Collector {
+ public:
+  Result<void> take(const std::string& type, const Message& message) {
+    if (type == "jostle_msgs/msg/TaskRun") {
+      return with<TaskRun>(message, [&](TaskRun run) {
+        const std::string id = run.goal().goal_id();
+        if (parts_[id].run) return;
+        order_.push_back(id);
+        parts_[id].run = std::move(run);
+        parts_[id].begin = message.log_time;
+      });
+    }
+    if (type == "jostle_msgs/msg/Observation") {
+      return with<Observation>(message, [&](Observation seen) {
+        parts_[seen.goal_id()].observations.try_emplace(seen.number(), std::move(seen), message.log_time);
+      });
+    }
+    if (type == "jostle_msgs/msg/Plan") {
+      return with<Plan>(message,
+                        [&](Plan plan) { parts_[plan.goal_id()].plans.try_emplace(plan.number(), std::move(plan)); });
+    }
+    return with<GoalResult>(message, [&](GoalResult result) {
+      parts_[result.goal_id()].end = message.log_time;
+      parts_[result.goal_id()].result = std::move(result);
+    });
+  }
+
+  Result<std::vector<RecordedRun>> runs(const BagInfo& info) const {
+    if (order_.empty()) {
+      return Error{
+          Code::kNotFound,
+          fmt::format("{}: got {}, wanted a run with its observations and plans (/task/run, /task/observation, "
+                      "/task/plan); `jostle run --record` and `jostle record` record them",
+                      info.path.string(), names(info))};
+    }
+    std::vector<RecordedRun> runs;
+    for (const std::string& id : order_) {
+      auto run_result = complete(parts_.at(id), fmt::format("{}: run {}", info.path.string(), id));
+      if (!run_result) return run_result.error();
+      if (!run_result->result) run_result->end = info.end;
+      runs.push_back(std::move(run_result).value());
+    }
+    return runs;
+  }
+
+ private:
+  template <class T, class Use>
+  static Result<void> with(const Message& message, const Use& use) {
+    auto result = wire::from_cdr<T>(message.data);
+    if (!result) return result.error();
+    use(std::move(result).value());
+    return {};
+  }
+
+  static Result<RecordedRun> complete(const Parts& parts, const std::string& where) {
+    RecordedRun run{.run = *parts.run, .begin = parts.begin, .end = parts.end, .result = parts.result};
+    for (const auto& [number, entry] : parts.observations) {
+      if (number != run.observations.size()) return missing(where, "observation", run.observations.size());
+      run.observations.push_back(entry.first);
+      run.observed.push_back(entry.second);
+    }
+    for (const auto& [number, plan] : parts.plans) {
+      if (number != run.plans.size()) return missing(where, "plan", run.plans.size());
+      if (plan.observation() >= run.observations.size()) return missing(where, "observation", plan.observation());
+      run.plans.push_back(plan);
+    }
+    if (run.observations.empty()) return missing(where, "observation", 0);
+    return run;
+  }
+
+  static Error missing(const std::string& where, const char* what, std::size_t number) {
+    return {Code::kInvalidArgument,
+            fmt::format("{}: {} {} is missing, wanted all; `jostle bag info` says whether the recorder lost some",
+                        where, what, number)};
+  }
+
+  std::map<std::string, Parts> parts_;  // by goal
+  std::vector<std::string> order_;      // of the runs' beginnings
+};
+
+}  // namespace
+
+bool RecordedRun::concluded() const {
+  if (!result || !result->error().empty()) return false;
+  return !result->reason().starts_with("timeout") && result->reason() != "cancelled";
+}
+
+Result<std::vector<RecordedRun>> select_runs(std::vector<RecordedRun> runs, const std::string& goal_id) {
+  if (goal_id.empty()) return runs;
+  std::string ids;
+  for (const RecordedRun& run : runs) ids += (ids.empty() ? "" : ", ") + run.run.goal().goal_id();
+  std::erase_if(runs, [&](const RecordedRun& run) { return run.run.goal().goal_id() != goal_id; });
+  if (!runs.empty()) return runs;
+  return Error{Code::kNotFound, fmt::format("--goal: got '{}', wanted one of this bag: {}", goal_id, ids)};
+}
+
+Result<std::vector<RecordedRun>> read_runs(BagReader& reader) {
+  Collector collector;
+  const std::vector<int> topics = topics_of(reader.info());
+  if (!topics.empty()) reader.seek(reader.info().start, topics);  // no topics would mean all
+  while (!topics.empty()) {
+    auto message_result = reader.next();
+    if (!message_result) return message_result.error();
+    if (!*message_result) break;
+    const Message& message = **message_result;
+    const Topic& topic = reader.info().topics[static_cast<std::size_t>(message.topic)].topic;
+    if (auto ok = collector.take(topic.type, message); !ok) {
+      return Error{ok.error().code,
+                   fmt::format("{}: {}: {}", reader.info().path.string(), topic.name, ok.error().message)};
+    }
+  }
+  return collector.runs(reader.info());
+}
+
+}  // namespace jostle::bags

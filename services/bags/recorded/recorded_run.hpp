@@ -1,0 +1,38 @@
+#pragma once
+/// \file
+/// RecordedRun: all that decided a task, and what was decided, from a bag.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "idl/msg/task.h"
+#include "idl/types/result.hpp"
+#include "services/bags/format/bag_reader.hpp"
+
+namespace jostle::bags {
+
+struct RecordedRun {
+  jostle_msgs::msg::TaskRun run;
+  Time begin = 0, end = 0;  ///< when the run was heard of first, and when its result, or the bag's end
+  std::vector<jostle_msgs::msg::Observation> observations;  ///< entry i has number i
+  std::vector<Time> observed;                               ///< when each was recorded
+  std::vector<jostle_msgs::msg::Plan> plans;                ///< entry i has number i
+  std::optional<jostle_msgs::msg::GoalResult> result;       ///< nothing: the recording ends before
+
+  /// Whether it came to an end of its own, rather than being cancelled, timed out or cut off.
+  bool concluded() const;
+};
+
+/// The run of a goal, or every run.
+/// Error kNotFound if there is no such goal; names those there are.
+Result<std::vector<RecordedRun>> select_runs(std::vector<RecordedRun> runs, const std::string& goal_id);
+
+/// Every run of a bag, in the order they were taken up. Topics are found by their types,
+/// whatever namespace they are in.
+/// Errors   kNotFound         no run in it; says what there is and the remedy
+///          kInvalidArgument  an observation or a plan is missing; names it
+///          those of BagReader
+Result<std::vector<RecordedRun>> read_runs(BagReader& reader);
+
+}  // namespace jostle::bags

@@ -1,0 +1,43 @@
+#include "services/bags/replay/recorded_world.hpp"
+
+#include "services/common/process/program.hpp"
+
+namespace jostle::bags {
+
+RecordedWorld::RecordedWorld(const RecordedRun& run, double rate)
+    : run_(run), rate_(rate), start_(std::chrono::steady_clock::now()) {}
+
+double RecordedWorld::time() const { return world::seconds(run_.observations[at_].header()); }
+
+Result<world::Seen> RecordedWorld::seen() const { return world::from_message(run_.observations[at_]); }
+
+Result<void> RecordedWorld::advance(std::stop_token stop) {
+  if (at_ + 1 == run_.observations.size()) {
+    over_ = true;
+    return Error{Code::kCancelled, "the recording ends here"};
+  }
+  ++at_;
+  if (rate_ <= 0) return {};
+  const std::chrono::duration<double> since(static_cast<double>(run_.observed[at_] - run_.observed[0]) * 1e-9 / rate_);
+  if (common::pause_until(start_ + std::chrono::duration_cast<std::chrono::nanoseconds>(since), std::move(stop)))
+    return {};
+  return Error{Code::kCancelled, "stopped on request"};
+}
+
+Result<robot_bridge::RobotReading> RecordedWorld::Robot::read() {
+  auto seen_result = world_.seen();
+  if (!seen_result) return seen_result.error();
+  return std::move(seen_result->robot);
+}
+
+Result<void> RecordedWorld::Robot::execute(std::span<const double>, double, std::stop_token stop) {
+  return world_.advance(std::move(stop));
+}
+
+Result<std::vector<perception::ObjectReading>> RecordedWorld::Objects::read() {
+  auto seen_result = world_.seen();
+  if (!seen_result) return seen_result.error();
+  return std::move(seen_result->objects);
+}
+
+}  // namespace jostle::bags

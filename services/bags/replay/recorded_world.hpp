@@ -1,0 +1,60 @@
+#pragma once
+/// \file
+/// RecordedWorld: a robot and its objects that do again what they once did.
+
+#include <chrono>
+#include <vector>
+
+#include "perception/api/object_source.hpp"
+#include "robot_bridge/api/robot.hpp"
+#include "services/bags/recorded/recorded_run.hpp"
+#include "services/world/link/messages.hpp"
+
+namespace jostle::bags {
+
+/// Gives out one recorded observation after the other, whatever it is commanded: the next
+/// one follows a command. After the last there is none, and a command ends with kCancelled.
+///
+/// Threads  one.
+class RecordedWorld {
+ public:
+  /// `rate`: recorded seconds per second; 0: as fast as it is asked. The run outlives it.
+  RecordedWorld(const RecordedRun& run, double rate);
+
+  class Robot;
+  class Objects;
+
+  double time() const;                           ///< of the present observation, s of the world's clock
+  bool asked_for_more() const { return over_; }  ///< a command came after the last observation
+
+ private:
+  Result<world::Seen> seen() const;
+  Result<void> advance(std::stop_token stop);
+
+  const RecordedRun& run_;
+  const double rate_;
+  const std::chrono::steady_clock::time_point start_;
+  std::size_t at_ = 0;  // the present observation
+  bool over_ = false;
+};
+
+class RecordedWorld::Robot final : public robot_bridge::Robot {
+ public:
+  explicit Robot(RecordedWorld& world) : world_(world) {}
+  Result<robot_bridge::RobotReading> read() override;
+  Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override;
+
+ private:
+  RecordedWorld& world_;
+};
+
+class RecordedWorld::Objects final : public perception::ObjectSource {
+ public:
+  explicit Objects(const RecordedWorld& world) : world_(world) {}
+  Result<std::vector<perception::ObjectReading>> read() override;
+
+ private:
+  const RecordedWorld& world_;
+};
+
+}  // namespace jostle::bags

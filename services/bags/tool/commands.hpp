@@ -1,0 +1,47 @@
+#pragma once
+/// \file
+/// What `jostle bag` does. Every command prints what it has to say and returns an exit code.
+
+#include <filesystem>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::bags {
+
+struct InfoArguments {
+  std::filesystem::path bag;
+  bool as_json = false;
+};
+/// What a bag holds, without reading its messages.
+int show_info(const InfoArguments& arguments);
+
+/// Reads everything. kExitFailed at the first thing that is not as it should be.
+int verify_bag(const std::filesystem::path& bag, std::stop_token stop);
+
+struct RecoverArguments {
+  std::filesystem::path bag;
+  std::filesystem::path output;  ///< a folder that is not there yet; empty: the bag's name and "-recovered"
+};
+/// Writes what is readable as a new bag. kExitFailed if nothing is. Leaves nothing behind
+/// when it is interrupted or cannot write.
+int recover_bag(const RecoverArguments& arguments, std::stop_token stop);
+
+struct ExportArguments {
+  std::filesystem::path bag;
+  bool as_csv = false;              ///< else JSON, an object per line
+  std::vector<std::string> topics;  ///< patterns of the shell; all if empty
+  std::optional<double> from, to;   ///< s since the bag's start
+  std::string output;               ///< CSV: a folder; JSON: a file; "-": standard output
+};
+/// Decoded messages. Leaves nothing behind when it is interrupted or cannot write.
+int export_bag(const ExportArguments& arguments, std::stop_token stop);
+
+/// "jostle bag: …" on standard error; the exit code for it: kExitInterrupted after kCancelled,
+/// kExitUsage for what the user named wrongly, else `otherwise`.
+int fail(const Error& error, int otherwise);
+
+}  // namespace jostle::bags

@@ -1,0 +1,36 @@
+#include "services/bags/tool/decoders.hpp"
+
+#include <fmt/format.h>
+
+namespace jostle::bags {
+
+Decoders::Decoders(const BagInfo& info) {
+  for (const TopicInfo& topic : info.topics) {
+    names_.push_back(topic.topic.name);
+    reasons_.emplace_back();
+    decoders_.emplace_back();
+    const std::string definition =
+        topic.topic.definition.empty() ? definition_of(topic.topic.type).value_or("") : topic.topic.definition;
+    if (definition.empty()) {
+      reasons_.back() =
+          fmt::format("{}: got no definition of {} in the bag, and none is known", topic.topic.name, topic.topic.type);
+      continue;
+    }
+    auto decoder_result = Decoder::create(topic.topic.type, definition);
+    if (decoder_result) {
+      decoders_.back().emplace(std::move(*decoder_result));
+    } else {
+      reasons_.back() = fmt::format("{}: {}", topic.topic.name, decoder_result.error().message);
+    }
+  }
+}
+
+Result<nlohmann::ordered_json> Decoders::decode(const Message& message) const {
+  const auto topic = static_cast<std::size_t>(message.topic);
+  auto json_result = decoders_.at(topic)->decode(message.data);
+  if (json_result) return json_result;
+  return Error{json_result.error().code, fmt::format("{}: message of log time {}: {}", names_[topic], message.log_time,
+                                                     json_result.error().message)};
+}
+
+}  // namespace jostle::bags

@@ -1,0 +1,32 @@
+#pragma once
+/// \file
+/// A decoder for every topic of a bag that can have one.
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/bags/format/bag_reader.hpp"
+#include "services/bags/format/definitions.hpp"
+
+namespace jostle::bags {
+
+class Decoders {
+ public:
+  /// By the bag's own definitions; by ours where it brings none. A definition that is
+  /// malformed is as good as none.
+  explicit Decoders(const BagInfo& info);
+
+  bool has(int topic) const { return decoders_.at(static_cast<std::size_t>(topic)).has_value(); }
+  /// Why not.
+  const std::string& reason(int topic) const { return reasons_.at(static_cast<std::size_t>(topic)); }
+  /// Error as Decoder's, with the topic in front.
+  Result<nlohmann::ordered_json> decode(const Message& message) const;
+
+ private:
+  std::vector<std::string> names_, reasons_;
+  std::vector<std::optional<Decoder>> decoders_;
+};
+
+}  // namespace jostle::bags

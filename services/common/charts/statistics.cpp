@@ -1,0 +1,58 @@
+#include "services/common/charts/statistics.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace jostle::common {
+namespace {
+
+constexpr double kTail = 0.05;  // each side of a 90 % interval
+
+// P(i of n fair coins show heads).
+double binomial(double n, double i) {
+  return std::exp(std::lgamma(n + 1) - std::lgamma(i + 1) - std::lgamma(n - i + 1) - n * std::log(2.0));
+}
+
+}  // namespace
+
+double quantile(std::vector<double> values, double p) {
+  std::ranges::sort(values);
+  const double place = p * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return std::lerp(values[below], values[above], place - static_cast<double>(below));
+}
+
+Interval median_interval(std::vector<double> values) {
+  std::ranges::sort(values);
+  const std::size_t n = values.size();
+  std::size_t outside = 0;  // values left out on each side
+  double tail = binomial(static_cast<double>(n), 0);
+  while (2 * (outside + 1) < n) {
+    tail += binomial(static_cast<double>(n), static_cast<double>(outside + 1));
+    if (tail > kTail) break;
+    ++outside;
+  }
+  return {values[outside], values[n - 1 - outside]};
+}
+
+Mean mean_of(const std::vector<double>& values) {
+  if (values.empty()) return {};
+  const auto n = static_cast<double>(values.size());
+  double sum = 0.0, squares = 0.0;
+  for (const double value : values) sum += value;
+  for (const double value : values) squares += (value - sum / n) * (value - sum / n);
+  const double deviation = n > 1 ? std::sqrt(squares / (n - 1)) : 0.0;
+  return {.value = sum / n, .half_width = 1.96 * deviation / std::sqrt(n)};
+}
+
+Share wilson_interval(int successes, int runs) {
+  if (runs == 0) return {};
+  constexpr double z = 1.959964;  // 95 %
+  const double n = runs, p = successes / n;
+  const double centre = (p + z * z / (2 * n)) / (1 + z * z / n);
+  const double half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
+  return {.successes = successes, .runs = runs, .low = centre - half, .high = centre + half};
+}
+
+}  // namespace jostle::common

@@ -1,0 +1,66 @@
+#pragma once
+/// \file
+/// Programs that this one starts and looks after.
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::common {
+
+/// A running child. It has a process group of its own, so that Ctrl-C in the
+/// terminal reaches only its parent; its output goes to a log file.
+///
+/// Destroying it ends the child: SIGTERM, and SIGKILL after two seconds.
+class ChildProcess {
+ public:
+  /// Error kNotFound if the program cannot be started; names it.
+  static Result<ChildProcess> start(const std::filesystem::path& program, const std::vector<std::string>& arguments,
+                                    const std::filesystem::path& log);
+
+  ChildProcess(ChildProcess&& other) noexcept;
+  ChildProcess& operator=(ChildProcess&& other) noexcept;
+  ~ChildProcess();
+
+  pid_t pid() const { return pid_; }
+
+  /// How it ended ("killed by signal 9", "exit code 1"), or nothing while it runs.
+  std::optional<std::string> ended();
+
+  /// Waits until it has ended, and says how.
+  std::string wait();
+
+  /// The same, for so long at most.
+  std::optional<std::string> wait_for(std::chrono::milliseconds patience);
+
+  /// Whether it has printed that so far.
+  bool has_said(const std::string& text) const;
+
+  /// Asks it to end, without waiting.
+  void terminate();
+
+  /// The last lines it printed, for an error message.
+  std::string last_words() const;
+
+ private:
+  ChildProcess(pid_t pid, std::filesystem::path log) : pid_(pid), log_(std::move(log)) {}
+  void end();
+
+  pid_t pid_ = -1;  // -1: moved from, or seen to have ended
+  std::filesystem::path log_;
+  std::optional<std::string> ended_;
+};
+
+/// Runs a program of the system to its end; it writes to `log`.
+/// Errors   kNotFound  it is not on PATH; names the Debian package that has it
+///          kIo        it failed; how, and its last words
+Result<void> run_tool(const std::string& name, const std::string& package, const std::vector<std::string>& arguments,
+                      const std::filesystem::path& log);
+
+}  // namespace jostle::common

@@ -1,0 +1,45 @@
+#pragma once
+/// \file
+/// Two worlds on one domain would speak into each other's topics.
+
+#include <chrono>
+#include <string>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::common {
+
+/// A role that only one process of a machine may have on a DDS domain, or in a namespace of it. Held
+/// until it is destroyed or the process ends, however it ends.
+///
+/// A bound socket without a file: there is nothing to clean up, and it reaches
+/// exactly as far as loopback traffic does, the network namespace.
+class DomainClaim {
+ public:
+  /// `role`: a few words; `space`: the namespace it is in, "" for none. Waits up to `patience` for a predecessor that
+  /// is just ending. Error kUnavailable if another process has the role.
+  static Result<DomainClaim> take(const std::string& role, int domain, std::chrono::milliseconds patience,
+                                  const std::string& space = "");
+
+  DomainClaim(DomainClaim&& other) noexcept;
+  DomainClaim& operator=(DomainClaim&& other) noexcept;
+  ~DomainClaim();
+
+ private:
+  explicit DomainClaim(int socket) : socket_(socket) {}
+
+  int socket_;
+};
+
+/// A domain that nobody else on this machine who asked here has.
+struct OwnDomain {
+  int domain = 0;
+  DomainClaim claim;  ///< while it is held
+};
+
+/// From 1 to 100: beyond, a domain's UDP ports are among those that Linux gives to sockets that
+/// ask for any (from 32768), and a domain whose port of discovery is somebody's finds nobody.
+/// Error kUnavailable if all are taken.
+Result<OwnDomain> claim_some_domain();
+
+}  // namespace jostle::common

@@ -1,0 +1,40 @@
+#pragma once
+/// \file
+/// Where programs find what lies beside them.
+
+#include <filesystem>
+#include <string>
+
+#include "idl/types/result.hpp"
+
+namespace jostle::common {
+
+/// The folder this program was started from, links resolved.
+std::filesystem::path program_folder();
+
+/// Where data of the programs in a folder lie: share/jostle of the nearest folder
+/// above that has one. Programs in build/bin find build/share/jostle, those in
+/// /usr/libexec/jostle find /usr/share/jostle. If there is none, the one that
+/// would lie beside, for a message to name.
+std::filesystem::path share_folder(const std::filesystem::path& programs);
+
+/// A data file of the project, `name` such as "experiments/chapter3.yaml", in the
+/// share folder of this program.
+std::filesystem::path data_file(const std::string& name);
+
+/// A coarse model's name for make_coarse_model: `learned` alone means the network that
+/// comes along, models/coarse-sliders.net.
+std::string coarse_model_name(const std::string& name);
+
+/// Error kIo naming the file.
+Result<std::string> read_text(const std::filesystem::path& file);
+
+/// Makes missing folders; replaces the file in one step, so that a reader
+/// never sees half of it. Error kIo naming the file.
+Result<void> write_text(const std::filesystem::path& file, const std::string& text);
+
+/// A new folder that only this user can read, for its caller to remove; `purpose`
+/// becomes part of its name. Error kIo naming it.
+Result<std::filesystem::path> make_temporary_folder(const std::string& purpose);
+
+}  // namespace jostle::common

@@ -1,0 +1,72 @@
+#pragma once
+/// \file
+/// What every program does the same way: ending on a signal, dying with its
+/// parent, exit codes, logging.
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace jostle::common {
+
+/// Exit codes of all programs.
+enum ExitCode : int {
+  kExitOk = 0,
+  kExitFailed = 1,        ///< the work was done and failed
+  kExitUsage = 2,         ///< wrong arguments or a bad file
+  kExitBroken = 3,        ///< parts of the system failed
+  kExitInterrupted = 130  ///< Ctrl-C
+};
+
+/// Turns SIGINT and SIGTERM into a stop request for the whole process. Another one, half a
+/// second later or more, ends it on the spot. Make one in main before any thread starts.
+class StopSignal {
+ public:
+  StopSignal();
+  StopSignal(const StopSignal&) = delete;
+  StopSignal& operator=(const StopSignal&) = delete;
+
+  std::stop_token token() const;
+};
+
+/// Returns once a stop was requested.
+void wait_for(std::stop_token stop);
+
+/// Waits until then, or until a stop is requested: whether the time came.
+bool pause_until(std::chrono::steady_clock::time_point time, std::stop_token stop);
+
+/// Ends this process when the one that started it ends, however it ends; at once
+/// if that has happened already. `parent`: its process id; 0 does nothing.
+void die_with_parent(pid_t parent);
+
+/// --discovery, --namespace and --secure, of every program that speaks DDS. They set JOSTLE_DISCOVERY,
+/// JOSTLE_NAMESPACE and JOSTLE_SECURE of this process: so whatever it starts joins in the same way.
+void add_network_options(CLI::App& app);
+
+/// What every process of a run can be told, add_network_options() included.
+struct ProcessOptions {
+  std::optional<int> domain;  ///< of DDS; else ROS_DOMAIN_ID, else 0
+  pid_t parent = 0;           ///< see die_with_parent
+};
+void add_process_options(CLI::App& app, ProcessOptions& options);
+
+/// "participant 00000000deadbeef": how a process says in its log who it is in a domain, for the one
+/// that started it. `id`: wire::Participant::id().
+std::string participant_name(std::uint64_t id);
+
+/// Parses the command line. An exit code if the program is to end: after --help,
+/// or with kExitUsage after wrong arguments.
+std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv);
+
+/// Log lines go to standard error as "NAME: level: text".
+void set_up_logging(const std::string& name);
+
+}  // namespace jostle::common

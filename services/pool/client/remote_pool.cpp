@@ -1,0 +1,364 @@
+#include "services/pool/client/remote_pool.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "services/pool/protocol.hpp"
+#include "services/wire/convert/pool.hpp"
+
+namespace jostle::pool {
+
+using physics_pool::BatchReply;
+using physics_pool::End;
+using physics_pool::kInfinity;
+using physics_pool::RolloutBatch;
+using physics_pool::RolloutOutcome;
+
+namespace msg = jostle_msgs::msg;
+
+namespace {
+
+// How often silence and stragglers are looked for while nothing arrives.
+constexpr std::chrono::milliseconds kTick{20};
+// Heartbeats that come so soon after the dispatcher's last turn wait for the next one.
+constexpr std::chrono::milliseconds kTogether{2};
+
+msg::BatchControl control(std::uint64_t client, Epoch epoch, ControlKind kind) {
+  msg::BatchControl message;
+  message.client(client);
+  message.epoch(epoch);
+  message.kind(static_cast<std::uint8_t>(kind));
+  return message;
+}
+
+// Whether an outcome is one that this batch can have.
+bool fits(const RolloutBatch& batch, const RolloutOutcome& outcome) {
+  const auto steps = static_cast<std::uint32_t>(batch.nominal.steps());
+  const bool waited = batch.wait && outcome.steps == 0;
+  const bool whole = outcome.end != End::kCompleted || outcome.steps == steps || waited;
+  const bool may_win =
+      outcome.end == End::kSucceeded || (outcome.end == End::kCompleted && outcome.cost < batch.incumbent);
+  const bool has_states = outcome.trajectory.size() == outcome.steps + std::size_t{1};
+  const bool right_sizes = std::ranges::all_of(outcome.trajectory, [&](const State& x) {
+    return x.q.size() == batch.x0.q.size() && x.v.size() == batch.x0.v.size();
+  });
+  return outcome.end != End::kSkipped && outcome.steps <= steps && whole && right_sizes &&
+         (has_states || (outcome.trajectory.empty() && (!may_win || waited)));
+}
+
+}  // namespace
+
+/// A batch between submit() and its reply.
+struct RemotePool::Active {
+  Epoch epoch = 0;
+  RolloutBatch batch;
+  msg::BatchDescription wire;
+  BatchReply reply;
+  double best_cost = kInfinity;
+  std::uint32_t first_success = UINT32_MAX;
+  wire::TimePoint started;
+  OnReply on_reply;
+  bool ended = false;
+};
+
+RemotePool::RemotePool(const wire::Participant& participant, const RemotePoolOptions& options)
+    : participant_(participant),
+      options_(options),
+      client_(participant.id()),
+      scheduler_(options.scheduler),
+      // Results for an earlier process with our participant's id must not fit.
+      last_epoch_(random_id() >> 16),
+      last_usable_(std::chrono::steady_clock::now()),
+      world_writer_(participant, wire::topics::kPoolWorld),
+      control_writer_(participant, wire::topics::kPoolControl),
+      result_reader_(participant, wire::topics::kPoolResult,
+                     [this](const msg::TaskResult& result) {
+                       if (result.client() != client_) return;
+                       const auto now = std::chrono::steady_clock::now();
+                       const std::lock_guard lock(mutex_);
+                       results_.push_back({result, now});
+                       kick();
+                     }),
+      heartbeat_reader_(participant, wire::topics::kPoolWorker,
+                        [this](const msg::WorkerHeartbeat& heartbeat) {
+                          const std::lock_guard lock(mutex_);
+                          heartbeats_.push_back(heartbeat);
+                          // Those of hundreds of workers, thousands a second, are absorbed several at a time.
+                          if (heartbeat.capacity() == 0 || std::chrono::steady_clock::now() > last_turn_ + kTogether)
+                            kick();
+                        }),
+      dispatcher_([this](std::stop_token stop) { dispatch(stop); }) {}
+
+RemotePool::~RemotePool() = default;
+
+void RemotePool::kick() {
+  kicked_ = true;
+  wake_.notify_one();
+}
+
+Result<Hash> RemotePool::load(const physics_pool::Scene& scene) {
+  const std::string text = physics_pool::to_yaml(scene);
+  const Hash hash = hash_of(text);
+  {
+    const std::lock_guard lock(mutex_);
+    if (worlds_.contains(hash)) return hash;
+  }
+  if (auto ok = physics_pool::validate(scene, fmt::format("scene '{}'", scene.name)); !ok) {
+    return ok.error();
+  }
+  msg::WorldDescription description;
+  description.high(hash.high);
+  description.low(hash.low);
+  description.scene(text);
+  if (!world_writer_.write(description)) {
+    return Error{Code::kUnavailable,
+                 fmt::format("{}: world {} could not be announced; a client may load as many as the "
+                             "topic's profile has instances, {} unless changed",
+                             wire::topics::kPoolWorld.name, to_string(hash), wire::topics::kPoolWorld.qos.instances)};
+  }
+  const std::lock_guard lock(mutex_);
+  worlds_.emplace(hash, std::pair(physics_pool::layout_of(scene), scene.physics.time_step));
+  return hash;
+}
+
+// A ticket; the batch's end and its own are both under the pool's mutex.
+class RemotePool::Underway final : public Ticket {
+ public:
+  Underway(RemotePool& pool, std::shared_ptr<Active> active) : pool_(pool), active_(std::move(active)) {}
+
+  ~Underway() override {
+    const std::lock_guard lock(pool_.mutex_);
+    if (!active_->ended) pool_.forget(*active_);
+  }
+
+  std::uint32_t missing() const override {
+    const std::lock_guard lock(pool_.mutex_);
+    return active_->ended ? 0 : pool_.scheduler_.missing(active_->epoch);
+  }
+
+ private:
+  RemotePool& pool_;
+  std::shared_ptr<Active> active_;
+};
+
+Result<std::unique_ptr<physics_pool::AsyncPool::Ticket>> RemotePool::submit(const RolloutBatch& batch,
+                                                                            OnReply on_reply) {
+  const std::lock_guard lock(mutex_);
+  const auto world = worlds_.find(batch.world);
+  if (world == worlds_.end()) {
+    return Error{Code::kUnknownWorld,
+                 fmt::format("world: got {}, wanted one given to load() before", to_string(batch.world))};
+  }
+  const auto& [layout, time_step] = world->second;
+  if (auto ok = physics_pool::validate(batch, layout, time_step); !ok) return ok.error();
+  const auto active = std::make_shared<Active>();
+  active->epoch = ++last_epoch_;
+  active->batch = batch;
+  active->wire = wire::to_wire(batch);
+  active->on_reply = std::move(on_reply);
+  active->started = std::chrono::steady_clock::now();
+  active->reply.outcomes.resize(batch.samples);
+  for (std::uint32_t i = 0; i < batch.samples; ++i) {
+    active->reply.outcomes[i].sample = batch.first_sample + i;
+  }
+  active_[active->epoch] = active;
+  scheduler_.start(active->epoch, batch.first_sample, batch.samples, batch.priority);
+  kick();
+  return std::unique_ptr<Ticket>(std::make_unique<Underway>(*this, active));
+}
+
+Error RemotePool::no_worker() const {
+  const double seconds = std::chrono::duration<double>(options_.no_worker_timeout).count();
+  std::string message = fmt::format("no {} for {:g} s on domain {}; start one with `jostle worker`",
+                                    ever_heard_ ? "usable worker" : "worker heard", seconds, participant_.domain());
+  if (!last_refusal_.empty()) message += fmt::format(" (last trouble: {})", last_refusal_);
+  return {Code::kUnavailable, std::move(message)};
+}
+
+void RemotePool::give_up_without_workers(wire::TimePoint now) {
+  std::vector<std::shared_ptr<Active>> hopeless;
+  for (const auto& [epoch, active] : active_) {
+    if (now >= std::max(last_usable_, active->started) + options_.no_worker_timeout) hopeless.push_back(active);
+  }
+  for (const auto& active : hopeless) finish(*active, no_worker());
+}
+
+void RemotePool::finish(Active& active, Result<BatchReply> reply) {
+  forget(active);
+  active.on_reply(std::move(reply));
+}
+
+// Of a batch that ended, or that nobody waits for any more; the workers may have to be told.
+void RemotePool::forget(Active& active) {
+  active.ended = true;
+  if (scheduler_.finish(active.epoch)) {
+    outgoing_.controls.push_back(control(client_, active.epoch, ControlKind::kCancel));
+    kick();
+  }
+  active_.erase(active.epoch);  // its ticket holds another share
+}
+
+void RemotePool::dispatch(std::stop_token stop) {
+  std::unique_lock lock(mutex_);
+  while (!stop.stop_requested()) {
+    wake_.wait_for(lock, stop, active_.empty() ? kHeartbeatPeriod : kTick, [&] { return kicked_; });
+    kicked_ = false;
+    const auto now = last_turn_ = std::chrono::steady_clock::now();
+    std::vector<WorkerId> strangers;
+    absorb_results(now);  // before heartbeats, which say what is still missing
+    absorb_heartbeats(now, strangers);
+    const std::vector<WorkerId> forgotten = scheduler_.check_silence(now);
+    if (scheduler_.usable_workers(now) > 0) last_usable_ = now;
+    give_up_without_workers(now);
+    prepare_tasks(now);
+    const Outgoing outgoing = std::exchange(outgoing_, {});
+
+    lock.unlock();
+    send(outgoing);
+    connect(strangers);
+    for (const WorkerId worker : forgotten) task_writers_.erase(worker);
+    lock.lock();
+  }
+}
+
+void RemotePool::connect(const std::vector<WorkerId>& workers) {
+  for (const WorkerId worker : workers) {
+    try {
+      task_writers_.try_emplace(worker, participant_, wire::topics::pool_task(worker));
+    } catch (const wire::SetupError& error) {
+      const std::lock_guard lock(mutex_);
+      last_refusal_ = error.what();
+    }
+  }
+}
+
+void RemotePool::send(const Outgoing& outgoing) {
+  for (const Control& message : outgoing.controls) control_writer_.write(message);
+  for (const auto& [worker, task] : outgoing.tasks) task_writers_.at(worker).write(task);
+}
+
+void RemotePool::absorb_heartbeats(wire::TimePoint now, std::vector<WorkerId>& strangers) {
+  for (const msg::WorkerHeartbeat& heartbeat : std::exchange(heartbeats_, {})) {
+    const auto writer = task_writers_.find(heartbeat.worker());
+    if (writer == task_writers_.end()) strangers.push_back(heartbeat.worker());
+    const auto us = std::ranges::find(heartbeat.clients(), client_, [](const auto& load) { return load.client(); });
+    const bool hears_us = us != heartbeat.clients().end();
+    std::uint64_t others = 0;
+    for (const msg::ClientLoad& load : heartbeat.clients()) others += load.client() == client_ ? 0 : load.samples();
+    scheduler_.heard({.worker = heartbeat.worker(),
+                      .name = heartbeat.name(),
+                      .capacity = static_cast<int>(std::min<std::uint32_t>(heartbeat.capacity(), INT32_MAX)),
+                      .ready = hears_us && writer != task_writers_.end() && writer->second.matched() > 0,
+                      .samples = hears_us ? us->samples() : 0,
+                      .others = others},
+                     now);
+    ever_heard_ = true;
+    changed_.notify_all();
+  }
+}
+
+void RemotePool::absorb_results(wire::TimePoint now) {
+  for (const Received& received : std::exchange(results_, {})) absorb(received, now);
+}
+
+void RemotePool::trace(const Received& received, bool first) const {
+  if (!options_.on_sample) return;
+  const auto seconds = [](std::int64_t nanoseconds) { return 1e-9 * static_cast<double>(nanoseconds); };
+  const msg::TaskResult& result = received.result;
+  options_.on_sample({.client = client_,
+                      .worker = result.worker(),
+                      .epoch = result.epoch(),
+                      .worker_name = scheduler_.name_of(result.worker()),
+                      .thread = result.thread(),
+                      .sample = result.sample(),
+                      .attempt = result.attempt(),
+                      .first = first,
+                      .sent = seconds(result.sent()),
+                      .received = std::chrono::duration<double>(received.at.time_since_epoch()).count(),
+                      .arrived = seconds(result.arrived()),
+                      .started = seconds(result.started()),
+                      .finished = seconds(result.finished())});
+}
+
+void RemotePool::absorb(const Received& received, wire::TimePoint now) {
+  const msg::TaskResult& result = received.result;
+  const auto found = active_.find(result.epoch());
+  if (found == active_.end()) {
+    scheduler_.accept(result.worker(), result.epoch(), result.sample(), 0, now);  // late: counted
+    if (result.error().empty()) trace(received, false);
+    return;
+  }
+  const std::shared_ptr<Active> active = found->second;
+  auto outcome_result = wire::from_wire(result);
+  const bool refused = !result.error().empty();
+  if (refused && outcome_result.error().code != Code::kUnknownWorld) {
+    const Error& error = outcome_result.error();
+    finish(*active, Error{error.code, fmt::format("worker {:016x}: {}", result.worker(), error.message)});
+    return;
+  }
+  if (!outcome_result || !fits(active->batch, *outcome_result)) {
+    // Others may do better; the batch is given up when nobody is left.
+    last_refusal_ = fmt::format("worker {:016x}: {}", result.worker(),
+                                outcome_result ? "its result does not fit the batch" : outcome_result.error().message);
+    scheduler_.bench(result.worker(), now);
+    return;
+  }
+  const bool first = scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps(), now,
+                                       std::chrono::duration<double>(1e-9 * (static_cast<double>(result.finished()) -
+                                                                             static_cast<double>(result.started()))));
+  trace(received, first);
+  if (!first) return;
+  adopt(*active, std::move(outcome_result).value());
+  if (scheduler_.missing(active->epoch) > 0) return;
+  active->reply.winner = physics_pool::select_winner(active->reply.outcomes, active->batch.incumbent);
+  finish(*active, std::move(active->reply));
+}
+
+// Keeps an outcome and tells the siblings what it means for them.
+void RemotePool::adopt(Active& active, RolloutOutcome outcome) {
+  const std::uint32_t sample = outcome.sample;
+  if (outcome.end == End::kSucceeded && sample < active.first_success) {
+    active.first_success = sample;
+    scheduler_.drop_above(active.epoch, sample);
+    outgoing_.controls.push_back(control(client_, active.epoch, ControlKind::kSuccess));
+    outgoing_.controls.back().sample(sample);
+  }
+  if (outcome.end == End::kCompleted && outcome.cost < active.best_cost) {
+    active.best_cost = outcome.cost;
+    if (active.batch.stop_losers && !active.batch.wait) {
+      outgoing_.controls.push_back(control(client_, active.epoch, ControlKind::kCost));
+      outgoing_.controls.back().cost(outcome.cost);
+    }
+  }
+  active.reply.outcomes[sample - active.batch.first_sample] = std::move(outcome);
+}
+
+void RemotePool::prepare_tasks(wire::TimePoint now) {
+  for (const Assignment& assignment : scheduler_.assign(now)) {
+    const Active& active = *active_.at(assignment.epoch);
+    Task task;
+    task.client(client_);
+    task.epoch(assignment.epoch);
+    task.attempt(assignment.attempt);
+    task.batch(active.wire);
+    task.best_cost(active.best_cost);
+    task.first_success(active.first_success);
+    task.samples(assignment.samples);
+    task.sent(std::chrono::nanoseconds(now.time_since_epoch()).count());
+    outgoing_.tasks.emplace_back(assignment.worker, std::move(task));
+  }
+}
+
+physics_pool::PoolStatus RemotePool::status() const {
+  const std::lock_guard lock(mutex_);
+  return scheduler_.status();
+}
+
+bool RemotePool::wait_for_workers(int count, wire::TimePoint deadline) const {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_until(lock, deadline,
+                             [&] { return scheduler_.usable_workers(std::chrono::steady_clock::now()) >= count; });
+}
+
+}  // namespace jostle::pool

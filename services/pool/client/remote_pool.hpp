@@ -1,0 +1,114 @@
+#pragma once
+/// \file
+/// RemotePool: the client half of the pool over DDS.
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "physics_pool/api/pool.hpp"
+#include "services/pool/client/scheduler.hpp"
+#include "services/pool/client/timeline.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+
+namespace jostle::pool {
+
+struct RemotePoolOptions {
+  /// How long a batch tolerates that no worker can be used.
+  std::chrono::milliseconds no_worker_timeout{10'000};
+  SchedulerOptions scheduler;
+  /// Hears of every sample that comes back, from the pool's own thread; must be quick
+  /// and use nothing of the pool's. Samples that are cancelled do not come back.
+  std::function<void(const SampleTrace&)> on_sample;
+};
+
+/// Pool of worker processes in one DDS domain. Simulates nothing itself; the
+/// README of this room describes the exchange.
+///
+/// Threads  safe from any thread. One thread of its own sends everything.
+/// Errors   besides those of Pool: kUnavailable when no worker could be used
+///          for `no_worker_timeout`. A worker's refusal of a task is the
+///          batch's error; it names the worker.
+/// Failure  a worker that dies, stalls or cannot do its work loses nothing:
+///          its samples go to others.
+class RemotePool final : public physics_pool::AsyncPool {
+ public:
+  RemotePool(const wire::Participant& participant, const RemotePoolOptions& options = {});
+  /// After every `run` has returned and every ticket is gone.
+  ~RemotePool() override;
+
+  Result<Hash> load(const physics_pool::Scene& scene) override;
+  Result<std::unique_ptr<Ticket>> submit(const physics_pool::RolloutBatch& batch, OnReply on_reply) override;
+  physics_pool::PoolStatus status() const override;
+
+  /// Whether `count` workers could be used by the deadline.
+  bool wait_for_workers(int count, physics_pool::TimePoint deadline) const;
+
+ private:
+  struct Active;
+  class Underway;
+  using Control = jostle_msgs::msg::BatchControl;
+  using Task = jostle_msgs::msg::Task;
+  struct Received {
+    jostle_msgs::msg::TaskResult result;
+    physics_pool::TimePoint at;
+  };
+  /// What leaves in one turn of the dispatcher.
+  struct Outgoing {
+    std::vector<Control> controls;
+    std::vector<std::pair<WorkerId, Task>> tasks;
+  };
+
+  Error no_worker() const;
+  void give_up_without_workers(physics_pool::TimePoint now);
+
+  void dispatch(std::stop_token stop);
+  void connect(const std::vector<WorkerId>& workers);
+  void send(const Outgoing& outgoing);
+  void absorb_results(physics_pool::TimePoint now);
+  void absorb_heartbeats(physics_pool::TimePoint now, std::vector<WorkerId>& strangers);
+  void absorb(const Received& received, physics_pool::TimePoint now);
+  void trace(const Received& received, bool first) const;
+  void adopt(Active& active, physics_pool::RolloutOutcome outcome);
+  void prepare_tasks(physics_pool::TimePoint now);
+  void finish(Active& active, Result<physics_pool::BatchReply> reply);
+  void forget(Active& active);
+  void kick();
+
+  const wire::Participant participant_;
+  const RemotePoolOptions options_;
+  const std::uint64_t client_;
+
+  mutable std::mutex mutex_;                     // guards everything down to kicked_
+  mutable std::condition_variable_any changed_;  // workers came or went
+  std::condition_variable_any wake_;             // of the dispatcher
+  Scheduler scheduler_;
+  Epoch last_epoch_;
+  std::unordered_map<Hash, std::pair<StateLayout, double>> worlds_;  // and their time steps, s
+  std::map<Epoch, std::shared_ptr<Active>> active_;                  // shared with its ticket
+  std::vector<Received> results_;
+  std::vector<jostle_msgs::msg::WorkerHeartbeat> heartbeats_;
+  Outgoing outgoing_;
+  physics_pool::TimePoint last_usable_;
+  std::string last_refusal_;
+  bool ever_heard_ = false;
+  physics_pool::TimePoint last_turn_;  // of the dispatcher
+  bool kicked_ = false;
+
+  wire::Writer<jostle_msgs::msg::WorldDescription> world_writer_;
+  wire::Writer<Control> control_writer_;
+  std::map<WorkerId, wire::Writer<Task>> task_writers_;  // of the dispatcher alone
+  // Readers and the dispatcher use all of the above: last made, first gone.
+  wire::Reader<jostle_msgs::msg::TaskResult> result_reader_;
+  wire::Reader<jostle_msgs::msg::WorkerHeartbeat> heartbeat_reader_;
+  std::jthread dispatcher_;
+};
+
+}  // namespace jostle::pool

@@ -1,0 +1,293 @@
+#include "services/pool/worker/worker_service.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/common/process/program.hpp"
+#include "services/pool/protocol.hpp"
+#include "services/wire/convert/pool.hpp"
+
+namespace jostle::pool {
+
+using physics_pool::RolloutBatch;
+using physics_pool::RolloutOutcome;
+using physics_pool::WorldPtr;
+
+namespace msg = jostle_msgs::msg;
+
+namespace {
+
+constexpr std::chrono::seconds kWorldPatience{5};  // a latched text arrives in milliseconds
+constexpr std::chrono::milliseconds kRetry{20};    // while a world is waited for
+constexpr std::size_t kArrivals = 1024;            // unread tasks; credit keeps honest clients far below
+constexpr std::size_t kCancelled = 64;             // cancelled batches remembered
+
+std::int64_t nanoseconds(std::chrono::steady_clock::time_point time) {
+  return std::chrono::nanoseconds(time.time_since_epoch()).count();
+}
+
+std::string host_name() {
+  char name[256] = "";
+  gethostname(name, sizeof name - 1);
+  return name;
+}
+
+Result<void> check_samples(const msg::Task& task) {
+  const std::uint32_t first = task.batch().first_sample(), count = task.batch().samples();
+  if (task.samples().empty() || task.samples().size() > count) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("task.samples: got {} of them, wanted 1 to {}", task.samples().size(), count)};
+  }
+  for (const std::uint32_t sample : task.samples()) {
+    if (sample >= first && sample - first < count) continue;
+    return Error{Code::kInvalidArgument,
+                 fmt::format("task.samples: got {}, wanted {} to {}", sample, first, std::uint64_t{first} + count - 1)};
+  }
+  if (std::isnan(task.best_cost())) {
+    return Error{Code::kInvalidArgument, "task.best_cost: got NaN, wanted a cost or +inf"};
+  }
+  return {};
+}
+
+}  // namespace
+
+WorkerService::WorkerService(const wire::Participant& participant, const WorkerOptions& options)
+    : id_(random_id()),
+      name_(options.name.empty() ? fmt::format("{}-{}", host_name(), getpid()) : options.name),
+      host_(host_name()),
+      threads_(std::max(options.threads, 1)),
+      result_writer_(participant, wire::topics::kPoolResult),
+      heartbeat_writer_(participant, wire::topics::kPoolWorker),
+      executor_(threads_, options.cores),
+      world_reader_(participant, wire::topics::kPoolWorld,
+                    [this](const msg::WorldDescription& world) {
+                      worlds_.announce({.high = world.high(), .low = world.low()}, world.scene());
+                    }),
+      control_reader_(participant, wire::topics::kPoolControl,
+                      [this](const msg::BatchControl& control) { obey(control); }),
+      task_reader_(participant, wire::topics::pool_task(id_),
+                   [this](const Task& task) {
+                     const std::lock_guard lock(mutex_);
+                     if (arrivals_.size() == kArrivals) return;
+                     arrivals_.push_back({task, std::chrono::steady_clock::now()});
+                     loads_[task.client()] += static_cast<std::uint32_t>(task.samples().size());
+                     kicked_ = true;
+                     wake_.notify_one();
+                   }),
+      server_([this](std::stop_token stop) { serve(stop); }),
+      heart_([this](std::stop_token stop) { beat(stop); }) {}
+
+WorkerService::~WorkerService() {
+  server_ = {};
+  heart_ = {};
+  const std::lock_guard lock(mutex_);
+  for (const auto& [batch, running] : running_) running.run->signals.cancel();
+}
+
+void WorkerService::serve(std::stop_token stop) {
+  std::unique_lock lock(mutex_);
+  while (!stop.stop_requested()) {
+    wake_.wait_for(lock, stop, kRetry, [&] { return kicked_; });
+    kicked_ = false;
+    const std::deque<Arrival> arrivals = std::exchange(arrivals_, {});
+    lock.unlock();
+    for (const Arrival& arrival : arrivals) examine(arrival);
+    lock.lock();
+    feed();
+  }
+}
+
+// Judges a task; what is wrong with it goes back, what is right gets in line.
+void WorkerService::examine(const Arrival& arrival) {
+  const Task& task = arrival.task;
+  RolloutBatch batch = wire::from_wire(task.batch());
+  if (auto ok = physics_pool::validate(batch); !ok) return refuse(task, ok.error());
+  if (auto ok = check_samples(task); !ok) return refuse(task, ok.error());
+  const auto world_result = worlds_.find(batch.world);
+  if (!world_result) {
+    if (std::chrono::steady_clock::now() - arrival.arrived > kWorldPatience) {
+      return refuse(task,
+                    Error{Code::kUnknownWorld,
+                          fmt::format("world: got {}, whose text did not arrive in {} s on {}", to_string(batch.world),
+                                      kWorldPatience.count(), wire::topics::kPoolWorld.name)});
+    }
+    const std::lock_guard lock(mutex_);
+    arrivals_.push_back(arrival);
+    return;
+  }
+  if (!*world_result) return refuse(task, world_result->error());
+  const WorldPtr& world = world_result->value();
+  if (auto ok = physics_pool::validate(batch, world->geometry().layout, world->time_step()); !ok) {
+    return refuse(task, ok.error());
+  }
+  accept(arrival, std::move(batch), world);
+}
+
+void WorkerService::accept(const Arrival& arrival, RolloutBatch batch, WorldPtr world) {
+  const std::lock_guard lock(mutex_);
+  const Task& task = arrival.task;
+  const BatchId id{task.client(), task.epoch()};
+  if (std::ranges::find(cancelled_, id) != cancelled_.end()) {
+    loads_[task.client()] -= static_cast<std::uint32_t>(task.samples().size());
+    return;
+  }
+  Running& running = running_[id];
+  if (!running.run) {
+    running.run = std::make_shared<physics_pool::BatchRun>();
+    running.run->batch = std::move(batch);
+    running.run->world = std::move(world);
+    running.run->on_outcome = [this, id](const RolloutOutcome& outcome, const physics_pool::Shift& shift) {
+      finish(id, outcome, shift);
+    };
+  }
+  running.run->signals.offer_cost(task.best_cost());
+  running.run->signals.offer_success(task.first_success());
+  for (const std::uint32_t sample : task.samples()) {
+    const Job job{
+        .client = task.client(), .epoch = task.epoch(), .sample = sample, .priority = running.run->batch.priority};
+    const Held held{.job = job, .attempt = task.attempt(), .sent = task.sent(), .arrived = arrival.arrived};
+    if (running.samples.try_emplace(sample, held).second) {
+      turns_.wait(job);
+    } else {
+      --loads_[task.client()];  // already here
+    }
+  }
+}
+
+void WorkerService::refuse(const Task& task, const Error& error) {
+  msg::TaskResult result;
+  result.client(task.client());
+  result.worker(id_);
+  result.epoch(task.epoch());
+  result.attempt(task.attempt());
+  result.sample(task.samples().empty() ? task.batch().first_sample() : task.samples().front());
+  result.error(error.message);
+  result.error_code(static_cast<std::uint8_t>(error.code));
+  result_writer_.write(result);
+  const std::lock_guard lock(mutex_);
+  loads_[task.client()] -= static_cast<std::uint32_t>(task.samples().size());
+}
+
+// Gives every free thread a sample. No earlier: a sample that comes while the
+// threads are busy may have the better claim to the next free one.
+void WorkerService::feed() {
+  while (dealt_ < threads_) {
+    const auto job = turns_.next();
+    if (!job) return;
+    Running& running = running_.at({job->client, job->epoch});
+    running.samples.at(job->sample).job = *job;
+    ++dealt_;
+    executor_.submit(running.run, job->sample);
+  }
+}
+
+// On the thread that simulated, which takes its next sample from here: no other
+// thread has to wake up in between.
+void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, const physics_pool::Shift& shift) {
+  const bool skipped =
+      outcome.end == physics_pool::End::kSkipped;  // cancelled, or the client knows of the success that did it
+  std::unique_lock lock(mutex_);
+  const Held held = release(batch, outcome.sample);
+  lock.unlock();
+  if (!skipped) {
+    msg::TaskResult result = wire::to_wire(outcome);
+    result.client(batch.first);
+    result.worker(id_);
+    result.epoch(batch.second);
+    result.attempt(held.attempt);
+    result.sent(held.sent);
+    result.arrived(nanoseconds(held.arrived));
+    result.started(nanoseconds(shift.started));
+    result.finished(nanoseconds(shift.finished));
+    result.thread(static_cast<std::uint32_t>(shift.thread));
+    result_writer_.write(result);
+  }
+  lock.lock();
+  --loads_[batch.first];  // after the answer: a client may trust "nothing of yours is here"
+  ++rollouts_;
+  engine_steps_ += outcome.engine_steps;
+  turns_.done(held.job, shift.finished - shift.started, skipped);
+  --dealt_;
+  feed();
+}
+
+// Of a sample that waits or runs no more.
+WorkerService::Held WorkerService::release(const BatchId& batch, std::uint32_t sample) {
+  const auto running = running_.find(batch);
+  const auto found = running->second.samples.find(sample);
+  const Held held = found->second;
+  running->second.samples.erase(found);
+  if (running->second.samples.empty()) running_.erase(running);
+  return held;
+}
+
+void WorkerService::obey(const msg::BatchControl& control) {
+  const std::lock_guard lock(mutex_);
+  const BatchId id{control.client(), control.epoch()};
+  if (control.kind() == static_cast<std::uint8_t>(ControlKind::kCancel)) return cancel(id);
+  const auto running = running_.find(id);
+  if (running == running_.end()) return;
+  physics_pool::BatchSignals& signals = running->second.run->signals;
+  if (control.kind() == static_cast<std::uint8_t>(ControlKind::kCost)) signals.offer_cost(control.cost());
+  if (control.kind() == static_cast<std::uint8_t>(ControlKind::kSuccess)) signals.offer_success(control.sample());
+}
+
+// Running samples notice within an engine step; waiting ones are gone at once.
+void WorkerService::cancel(const BatchId& batch) {
+  cancelled_.push_back(batch);
+  if (cancelled_.size() > kCancelled) cancelled_.pop_front();
+  const auto running = running_.find(batch);
+  if (running == running_.end()) return;
+  running->second.run->signals.cancel();
+  for (const Job& job : turns_.withdraw(batch.first, batch.second)) {
+    release(batch, job.sample);
+    --loads_[batch.first];
+  }
+}
+
+void WorkerService::beat(std::stop_token stop) {
+  do {
+    const std::vector<std::uint64_t> clients = result_writer_.matched_participants();
+    drop_lost_clients(clients);
+    heartbeat_writer_.write(heartbeat(clients));
+  } while (common::pause_until(std::chrono::steady_clock::now() + kHeartbeatPeriod, stop));
+  msg::WorkerHeartbeat leave = heartbeat({});
+  leave.capacity(0);
+  heartbeat_writer_.write(leave);
+}
+
+void WorkerService::drop_lost_clients(const std::vector<std::uint64_t>& clients) {
+  const std::lock_guard lock(mutex_);
+  std::vector<BatchId> lost;
+  for (const auto& [batch, running] : running_) {
+    if (!std::ranges::binary_search(clients, batch.first)) lost.push_back(batch);
+  }
+  for (const BatchId& batch : lost) cancel(batch);
+  std::erase_if(loads_, [](const auto& load) { return load.second == 0; });
+}
+
+msg::WorkerHeartbeat WorkerService::heartbeat(const std::vector<std::uint64_t>& clients) const {
+  msg::WorkerHeartbeat message;
+  message.worker(id_);
+  message.name(name_);
+  message.host(host_);
+  message.pid(static_cast<std::uint32_t>(getpid()));
+  message.capacity(static_cast<std::uint32_t>(threads_));
+  for (const Hash& world : worlds_.compiled()) message.worlds().push_back(wire::to_wire(world));
+  const std::lock_guard lock(mutex_);
+  message.rollouts(rollouts_);
+  message.engine_steps(engine_steps_);
+  for (const std::uint64_t client : clients) {
+    msg::ClientLoad load;
+    load.client(client);
+    const auto found = loads_.find(client);
+    load.samples(found == loads_.end() ? 0 : found->second);
+    message.clients().push_back(load);
+  }
+  return message;
+}
+
+}  // namespace jostle::pool

@@ -1,0 +1,113 @@
+#pragma once
+/// \file
+/// WorkerService: the worker half of the pool over DDS.
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "physics_pool/local/executor.hpp"
+#include "services/pool/worker/turns.hpp"
+#include "services/pool/worker/world_store.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+
+namespace jostle::pool {
+
+struct WorkerOptions {
+  std::string name;        ///< as clients report it; empty: host and process id
+  int threads = 1;         ///< rollouts at a time; one per core is enough
+  std::vector<int> cores;  ///< of each simulating thread; empty: wherever the system likes
+};
+
+/// Takes tasks, runs their samples, answers each. Clients and priorities share the
+/// threads by turns.hpp; whose sample runs is decided when a thread is free, not before.
+///
+/// Threads  `threads` that simulate; one that checks tasks, compiles worlds and
+///          deals samples out; one for heartbeats, so that a worker deep in
+///          physics is still heard.
+/// Failure  a bad task is answered with an error that names the field; a task
+///          whose world does not arrive in 5 s likewise. A client that is gone
+///          has its samples dropped.
+class WorkerService {
+ public:
+  WorkerService(const wire::Participant& participant, const WorkerOptions& options);
+  /// Cancels what runs and takes leave of the clients; milliseconds.
+  ~WorkerService();
+
+  std::uint64_t id() const { return id_; }
+  const std::string& name() const { return name_; }
+
+ private:
+  using Task = jostle_msgs::msg::Task;
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  /// Names a batch: client and epoch.
+  using BatchId = std::pair<std::uint64_t, std::uint64_t>;
+  /// A task that was not looked at yet, or waits for its world.
+  struct Arrival {
+    Task task;
+    TimePoint arrived;
+  };
+  /// A sample that waits or runs, and what its answer repeats of its task.
+  struct Held {
+    Job job;
+    std::uint32_t attempt = 0;
+    std::int64_t sent = 0;  // ns, the client's clock
+    TimePoint arrived;
+  };
+  /// A batch of which samples wait or run here.
+  struct Running {
+    physics_pool::BatchRunPtr run;
+    std::map<std::uint32_t, Held> samples;  // by index
+  };
+
+  void serve(std::stop_token stop);
+  void examine(const Arrival& arrival);
+  void accept(const Arrival& arrival, physics_pool::RolloutBatch batch, physics_pool::WorldPtr world);
+  void refuse(const Task& task, const Error& error);
+  void feed();
+  void finish(const BatchId& batch, const physics_pool::RolloutOutcome& outcome, const physics_pool::Shift& shift);
+  Held release(const BatchId& batch, std::uint32_t sample);
+  void obey(const jostle_msgs::msg::BatchControl& control);
+  void cancel(const BatchId& batch);
+  void beat(std::stop_token stop);
+  void drop_lost_clients(const std::vector<std::uint64_t>& clients);
+  jostle_msgs::msg::WorkerHeartbeat heartbeat(const std::vector<std::uint64_t>& clients) const;
+
+  const std::uint64_t id_;
+  const std::string name_;
+  const std::string host_;
+  const int threads_;
+  WorldStore worlds_;
+
+  mutable std::mutex mutex_;          // guards everything down to kicked_
+  std::condition_variable_any wake_;  // of the serving thread
+  std::deque<Arrival> arrivals_;
+  Turns turns_;
+  std::map<BatchId, Running> running_;
+  std::map<std::uint64_t, std::uint32_t> loads_;  // samples per client: arrived, waiting, running
+  std::deque<BatchId> cancelled_;                 // lately; a task may come after its cancellation
+  int dealt_ = 0;                                 // samples with the executor: one per busy thread
+  std::uint64_t rollouts_ = 0;
+  std::uint64_t engine_steps_ = 0;
+  bool kicked_ = false;
+
+  wire::Writer<jostle_msgs::msg::TaskResult> result_writer_;
+  wire::Writer<jostle_msgs::msg::WorkerHeartbeat> heartbeat_writer_;
+  physics_pool::Executor executor_;
+  // Readers and threads use all of the above: last made, first gone.
+  wire::Reader<jostle_msgs::msg::WorldDescription> world_reader_;
+  wire::Reader<jostle_msgs::msg::BatchControl> control_reader_;
+  wire::Reader<Task> task_reader_;
+  std::jthread server_;
+  std::jthread heart_;
+};
+
+}  // namespace jostle::pool

@@ -1,0 +1,230 @@
+#include "services/task/coordinator/coordinator.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "services/common/process/program.hpp"
+#include "services/world/link/messages.hpp"
+#include "services/world/link/world_client.hpp"
+
+namespace jostle::task {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kFeedbackPeriod{100};
+constexpr std::size_t kGoalQueue = 8;
+
+const char* word(planners::Phase phase) {
+  switch (phase) {
+    case planners::Phase::kPlanning:
+      return "planning";
+    case planners::Phase::kActing:
+      return "acting";
+    case planners::Phase::kClosing:
+      return "closing";
+    case planners::Phase::kDone:
+      return "done";
+  }
+  return "";
+}
+
+using Rollouts = std::map<std::string, std::uint64_t>;  // by worker
+
+Rollouts rollouts_of(const physics_pool::PoolStatus& pool) {
+  Rollouts rollouts;
+  for (const physics_pool::WorkerStatus& worker : pool.workers) rollouts[worker.name] += worker.rollouts;
+  return rollouts;
+}
+
+// What they did meanwhile; without those that did nothing.
+Rollouts since(const Rollouts& before, Rollouts now) {
+  for (auto& [name, count] : now) {
+    const auto found = before.find(name);
+    if (found != before.end()) count -= std::min(count, found->second);
+  }
+  std::erase_if(now, [](const auto& entry) { return entry.second == 0; });
+  return now;
+}
+
+// What the asker puts into result.json and draws.
+std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::uint64_t seed, const Rollouts& used) {
+  const planners::Plan& plan = outcome.first_plan;
+  nlohmann::json report{{"success", outcome.success},
+                        {"reason", outcome.reason},
+                        {"scene_hash", to_string(scene)},
+                        {"seed", seed},
+                        {"plan_hash", to_string(hash_of(plan.controls.values))},
+                        {"cost", plan.cost},
+                        {"iterations", plan.iterations},
+                        {"replans", outcome.replans},
+                        {"actions", outcome.actions},
+                        {"plan_seconds", outcome.plan_time.count()},
+                        {"planning_seconds", outcome.planning_time.count()},
+                        {"total_seconds", outcome.total_time.count()},
+                        {"rollouts", outcome.rollouts},
+                        {"used_workers", used},
+                        {"dropped_objects", outcome.dropped},
+                        {"plan_states", nlohmann::json::array()},
+                        {"observed_states", nlohmann::json::array()}};
+  for (const State& x : plan.states) report["plan_states"].push_back(x.q);
+  for (const State& x : outcome.observed) report["observed_states"].push_back(x.q);
+  return report.dump();
+}
+
+}  // namespace
+
+Coordinator::Coordinator(const wire::Participant& participant, physics_pool::AsyncPool& pool)
+    : participant_(participant),
+      pool_(pool),
+      feedback_writer_(participant, wire::topics::kTaskFeedback),
+      result_writer_(participant, wire::topics::kTaskResult),
+      run_writer_(participant, wire::topics::kTaskRun),
+      observation_writer_(participant, wire::topics::kTaskObservation),
+      plan_writer_(participant, wire::topics::kTaskPlan),
+      goals_(participant, wire::topics::kTaskGoal, kGoalQueue),
+      cancels_(participant, wire::topics::kTaskCancel, [this](const jostle_msgs::msg::Cancel& cancel) {
+        const std::lock_guard lock(mutex_);
+        if (!goal_id_.empty() && cancel.goal_id() == goal_id_) cancel_.request_stop();
+      }) {
+  feedback_.phase("idle");
+}
+
+void Coordinator::run(std::stop_token stop) {
+  const std::jthread ticker([this](std::stop_token own) { publish_feedback(own); });
+  while (!stop.stop_requested()) {
+    auto goal = goals_.take(steady_clock::now() + std::chrono::seconds(1), stop);
+    if (goal && !stop.stop_requested()) serve(*goal, stop);
+  }
+}
+
+void Coordinator::serve(const Goal& goal, std::stop_token stop) {
+  std::stop_token cancelled;
+  {
+    const std::lock_guard lock(mutex_);
+    goal_id_ = goal.goal_id();
+    cancel_ = {};
+    cancelled = cancel_.get_token();
+    started_ = steady_clock::now();
+    rollouts_before_ = 0;
+    feedback_ = {};
+    feedback_.goal_id(goal_id_);
+    feedback_.phase("preparing");
+  }
+  spdlog::info("goal {}: controller {}, predictor {}, seed {}", goal.goal_id(), goal.controller(), goal.predictor(),
+               goal.seed());
+  // A stop of the process cancels the task.
+  const std::stop_callback forward(stop, [this] {
+    const std::lock_guard lock(mutex_);
+    cancel_.request_stop();
+  });
+  jostle_msgs::msg::GoalResult result;
+  result.goal_id(goal.goal_id());
+  const Rollouts before = rollouts_of(pool_.status());
+  {
+    const std::jthread refuser([this](std::stop_token own) { refuse_goals_meanwhile(own); });
+    auto task_result = Task::prepare(goal, pool_, [](const std::string& why) { spdlog::info("split: {}", why); });
+    auto outcome_result =
+        task_result ? perform(goal, *task_result, cancelled) : Result<planners::Outcome>(task_result.error());
+    if (outcome_result) {
+      result.success(outcome_result->success);
+      result.reason(outcome_result->reason);
+      result.report(report_of(*outcome_result, physics_pool::scene_hash(task_result->execution_scene()), goal.seed(),
+                              since(before, rollouts_of(pool_.status()))));
+    } else {
+      const Error& error = outcome_result.error();
+      result.reason(error.code == Code::kCancelled ? "cancelled" : "the system failed");
+      result.error(error.message);
+    }
+  }
+  spdlog::info("goal {}: {} {}", goal.goal_id(), result.reason(), result.error());
+  result_writer_.write(result);
+  const std::lock_guard lock(mutex_);
+  goal_id_.clear();
+  feedback_.goal_id("");
+  feedback_.phase("idle");
+}
+
+Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task, std::stop_token stop) {
+  const physics_pool::TaskGeometry& geometry = task.geometry();
+  world::RobotClient robot(participant_);
+  world::ObjectsClient objects(participant_, robot);
+  run_writer_.write(describe_run(goal));
+  const Task::Watch watch{
+      .on_event = [&](const planners::ControlEvent& event) { note(event, geometry); },
+      .on_progress = [&](const planners::Progress& progress) { note(progress, geometry); },
+      .journal = {.on_observation =
+                      [this](const jostle_msgs::msg::Observation& seen) { observation_writer_.write(seen); },
+                  .on_plan = [this](const jostle_msgs::msg::Plan& plan) { plan_writer_.write(plan); }},
+      .time = [&] { return robot.time(); }};
+  return task.perform(robot, objects, watch, std::move(stop));
+}
+
+void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
+  while (!stop.stop_requested()) {
+    auto goal = goals_.take(steady_clock::now() + std::chrono::seconds(1), stop);
+    if (!goal) continue;
+    jostle_msgs::msg::GoalResult refusal;
+    refusal.goal_id(goal->goal_id());
+    refusal.reason("refused");
+    {
+      const std::lock_guard lock(mutex_);
+      refusal.error(fmt::format("coordinator: busy with goal {}; cancel it or wait", goal_id_));
+    }
+    result_writer_.write(refusal);
+  }
+}
+
+void Coordinator::note(const planners::ControlEvent& event, const physics_pool::TaskGeometry& geometry) {
+  const std::lock_guard lock(mutex_);
+  feedback_.phase(word(event.phase));
+  feedback_.actions(event.actions);
+  feedback_.replans(event.replans);
+  if (event.phase == planners::Phase::kPlanning) rollouts_before_ = feedback_.rollouts();
+  if (event.observed && !event.observed->q.empty()) {
+    feedback_.target_distance(physics_pool::goal_distance(geometry, *event.observed));
+  }
+}
+
+void Coordinator::note(const planners::Progress& progress, const physics_pool::TaskGeometry& geometry) {
+  const std::lock_guard lock(mutex_);
+  feedback_.iteration(progress.iteration);
+  feedback_.cost(progress.cost);
+  feedback_.rollouts(rollouts_before_ + progress.rollouts);
+  if (progress.final_state) {
+    feedback_.target_distance(physics_pool::goal_distance(geometry, *progress.final_state));
+  }
+}
+
+void Coordinator::publish_feedback(std::stop_token stop) {
+  do {
+    const physics_pool::PoolStatus pool = pool_.status();
+    jostle_msgs::msg::Feedback feedback;
+    {
+      const std::lock_guard lock(mutex_);
+      feedback = feedback_;
+      if (!goal_id_.empty()) {
+        feedback.elapsed(std::chrono::duration<double>(steady_clock::now() - started_).count());
+      }
+    }
+    const std::chrono::duration<double> now = std::chrono::system_clock::now().time_since_epoch();
+    feedback.header(world::make_header(now.count(), ""));
+    for (const physics_pool::WorkerStatus& worker : pool.workers) {
+      jostle_msgs::msg::WorkerReport report;
+      report.name(worker.name);
+      report.alive(worker.alive);
+      report.capacity(worker.capacity);
+      report.rollouts(worker.rollouts);
+      report.engine_steps(worker.engine_steps);
+      feedback.workers().push_back(std::move(report));
+    }
+    feedback_writer_.write(feedback);
+  } while (common::pause_until(steady_clock::now() + kFeedbackPeriod, stop));
+}
+
+}  // namespace jostle::task

@@ -1,0 +1,63 @@
+#pragma once
+/// \file
+/// The coordinator: accepts a task, plans it with a pool, executes it, reports.
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string>
+
+#include "physics_pool/api/pool.hpp"
+#include "services/task/session/task.hpp"
+#include "services/wire/dds/participant.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
+
+namespace jostle::task {
+
+/// One task at a time. A goal that arrives meanwhile is refused at once; a
+/// cancelled one ends within a fraction of a second, the robot standing still.
+///
+/// Feedback goes out several times a second whether there is news or not, so
+/// that silence means death. What decides a task and what it decides goes out as
+/// TaskRun, Observation and Plan: enough to make every decision again.
+class Coordinator {
+ public:
+  Coordinator(const wire::Participant& participant, physics_pool::AsyncPool& pool);
+
+  /// Until a stop is requested.
+  void run(std::stop_token stop);
+
+ private:
+  using Goal = jostle_msgs::msg::Goal;
+
+  Result<planners::Outcome> perform(const Goal& goal, Task& task, std::stop_token stop);
+  void serve(const Goal& goal, std::stop_token stop);
+  void refuse_goals_meanwhile(std::stop_token stop);
+  void publish_feedback(std::stop_token stop);
+  void note(const planners::ControlEvent& event, const physics_pool::TaskGeometry& geometry);
+  void note(const planners::Progress& progress, const physics_pool::TaskGeometry& geometry);
+
+  const wire::Participant participant_;
+  physics_pool::AsyncPool& pool_;
+
+  std::mutex mutex_;  // guards feedback_, started_, goal_id_ and cancel_
+  jostle_msgs::msg::Feedback feedback_;
+  std::chrono::steady_clock::time_point started_;
+  std::uint64_t rollouts_before_ = 0;  // of the plans before the present one
+  std::string goal_id_;                // empty: no task
+  std::stop_source cancel_;            // of the present task
+
+  wire::Writer<jostle_msgs::msg::Feedback> feedback_writer_;
+  wire::Writer<jostle_msgs::msg::GoalResult> result_writer_;
+  wire::Writer<jostle_msgs::msg::TaskRun> run_writer_;
+  wire::Writer<jostle_msgs::msg::Observation> observation_writer_;
+  wire::Writer<jostle_msgs::msg::Plan> plan_writer_;
+  wire::Inbox<Goal> goals_;
+  wire::Reader<jostle_msgs::msg::Cancel> cancels_;
+};
+
+}  // namespace jostle::task

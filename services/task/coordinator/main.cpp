@@ -1,0 +1,53 @@
+// jostle coordinator: plans and executes the tasks it is given.
+
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+
+#include "physics_pool/local/thread_pool.hpp"
+#include "services/common/process/cores.hpp"
+#include "services/common/process/program.hpp"
+#include "services/pool/client/remote_pool.hpp"
+#include "services/task/coordinator/coordinator.hpp"
+
+int main(int argc, char** argv) {
+  using namespace jostle;
+  using namespace jostle::task;
+  CLI::App app("Accepts a task, plans it with a pool of workers, executes it and reports.", "jostle coordinator");
+  std::string pool_kind = "dds";
+  int threads = common::usable_cores();
+  wire::ParticipantOptions participant_options{.name = "jostle_coordinator"};
+  common::ProcessOptions process;
+  app.add_option("--pool", pool_kind, "dds: worker processes; threads: in this process")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"dds", "threads"}));
+  common::add_count_option(app, "--threads", threads, 1,
+                           "Of the pool of threads; auto: one per core this process may use")
+      ->default_str("auto");
+  common::add_process_options(app, process);
+  if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
+  common::die_with_parent(process.parent);
+  participant_options.domain = process.domain;
+  const common::StopSignal signal;
+  common::set_up_logging("coordinator");
+
+  auto participant_result = wire::Participant::open(participant_options);
+  if (!participant_result) {
+    spdlog::error("{}", participant_result.error().message);
+    return common::kExitUsage;
+  }
+  spdlog::info("{}, domain {}", common::participant_name(participant_result->id()), participant_result->domain());
+  try {
+    std::unique_ptr<physics_pool::AsyncPool> pool;
+    if (pool_kind == "dds") {
+      pool = std::make_unique<pool::RemotePool>(*participant_result);
+    } else {
+      pool = std::make_unique<physics_pool::ThreadPool>(threads);
+    }
+    Coordinator(*participant_result, *pool).run(signal.token());
+    return common::kExitOk;
+  } catch (const wire::SetupError& error) {
+    spdlog::error("{}", error.what());
+    return common::kExitBroken;
+  }
+}

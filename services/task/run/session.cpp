@@ -1,0 +1,276 @@
+#include "services/task/run/session.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <iterator>
+
+#include "services/common/process/files.hpp"
+#include "services/common/process/program.hpp"
+
+namespace jostle::task {
+namespace {
+
+constexpr std::chrono::milliseconds kSilence{1500};  // of a process that speaks ten times a second
+constexpr std::chrono::seconds kStart{15};           // for processes to start and find each other
+constexpr std::chrono::milliseconds kTick{50};
+constexpr std::chrono::seconds kCancelPatience{2};
+constexpr std::chrono::seconds kLastWords{2};  // for the recorder to hear of the result, and end
+constexpr int kMostRestarts = 5;               // within kRestartWindow: something is wrong
+constexpr std::chrono::seconds kRestartWindow{10};
+
+std::filesystem::path program(const char* name) { return common::program_folder() / (std::string("jostle_") + name); }
+
+}  // namespace
+
+Result<std::unique_ptr<Session>> Session::start(const RunOptions& options, Watcher watcher) {
+  auto participant_result = wire::Participant::open({.name = "jostle_run", .domain = options.domain});
+  if (!participant_result) return participant_result.error();
+  // Two that start at once would each hear the other's processes and take them for their own.
+  auto claim_result = common::DomainClaim::take("run", participant_result->domain(), std::chrono::seconds(1),
+                                                participant_result->space());
+  if (!claim_result) return claim_result.error();
+  auto folder_result = common::make_temporary_folder("run");
+  if (!folder_result) return folder_result.error();
+  std::unique_ptr<Session> session(
+      new Session(options, std::move(watcher), *participant_result, std::move(claim_result).value(), *folder_result));
+  if (auto ok = session->start_recorder(); !ok) return ok.error();
+  if (auto ok = session->start_processes(); !ok) return ok.error();
+  return session;
+}
+
+Session::Session(const RunOptions& options, Watcher watcher, wire::Participant participant, common::DomainClaim claim,
+                 std::filesystem::path folder)
+    : options_(options),
+      watcher_(std::move(watcher)),
+      participant_(std::move(participant)),
+      claim_(std::move(claim)),
+      folder_(std::move(folder)),
+      goal_id_(folder_.filename().string()),
+      goal_(participant_, wire::topics::kTaskGoal),
+      cancel_(participant_, wire::topics::kTaskCancel),
+      feedback_(participant_, wire::topics::kTaskFeedback, 64),
+      world_(participant_, wire::topics::kRobotStatus, 64),
+      results_(participant_, wire::topics::kTaskResult, 8) {}
+
+Session::~Session() {
+  // All at once, then one after the other: shutting down takes as long as the slowest.
+  for (common::ChildProcess& worker : workers_) worker.terminate();
+  if (world_process_) world_process_->terminate();
+  if (coordinator_process_) coordinator_process_->terminate();
+  if (recorder_process_) recorder_process_->terminate();
+  workers_.clear();
+  world_process_.reset();
+  coordinator_process_.reset();
+  finish_recording();
+  std::error_code ignored;
+  std::filesystem::remove_all(folder_, ignored);
+}
+
+// Before everything else, so that it hears everything else.
+Result<void> Session::start_recorder() {
+  if (options_.record.empty()) return {};
+  auto process_result = common::ChildProcess::start(
+      program("record"),
+      {"--output", options_.record.string(), "--until-result", "--domain", std::to_string(participant_.domain()),
+       "--die-with-parent", std::to_string(getpid())},
+      folder_ / "record.log");
+  if (!process_result) return process_result.error();
+  recorder_process_ = std::move(process_result).value();
+  const auto deadline = Clock::now() + kStart;
+  while (!recorder_process_->has_said("ready")) {
+    const auto ended = recorder_process_->wait_for(kTick);
+    if (ended || Clock::now() >= deadline) {
+      const Error error{ended ? Code::kInvalidArgument : Code::kUnavailable,
+                        fmt::format("the recorder {}:\n{}", ended ? "did not start" : "is not ready",
+                                    recorder_process_->last_words())};
+      recorder_process_.reset();
+      return error;
+    }
+  }
+  return {};
+}
+
+void Session::finish_recording() {
+  if (!recorder_process_) return;
+  if (!recorder_process_->wait_for(kLastWords)) recorder_process_->terminate();
+  recorder_process_->wait_for(kStart);
+  look_after_recorder();
+}
+
+void Session::look_after_recorder() {
+  if (!recorder_process_) return;
+  const auto ended = recorder_process_->ended();
+  if (!ended) return;
+  if (*ended != "exit code 0" && watcher_.on_notice) {
+    watcher_.on_notice(fmt::format("the recorder ended: {}\n{}", *ended, recorder_process_->last_words()));
+  }
+  recorder_process_.reset();
+}
+
+Result<void> Session::start_processes() {
+  const std::string domain = std::to_string(participant_.domain());
+  const auto scene_file = folder_ / "scene.yaml";
+  if (auto ok = common::write_text(scene_file, physics_pool::to_yaml(options_.scene)); !ok) return ok;
+
+  auto world_result =
+      common::ChildProcess::start(program("sim"),
+                                  {scene_file.string(), "--uncertainty", physics_pool::to_string(options_.level),
+                                   "--seed", std::to_string(options_.seed), "--rate", fmt::format("{}", options_.rate),
+                                   "--domain", domain, "--die-with-parent", std::to_string(getpid())},
+                                  folder_ / "sim.log");
+  if (!world_result) return world_result.error();
+  world_process_ = std::move(world_result).value();
+
+  std::vector<std::string> arguments{"--pool", options_.pool,       "--domain",
+                                     domain,   "--die-with-parent", std::to_string(getpid())};
+  if (options_.pool == "threads") {
+    arguments.insert(arguments.end(), {"--threads", std::to_string(options_.workers)});
+  }
+  auto coordinator_result = common::ChildProcess::start(program("coordinator"), arguments, folder_ / "coordinator.log");
+  if (!coordinator_result) return coordinator_result.error();
+  coordinator_process_ = std::move(coordinator_result).value();
+
+  for (int i = 0; options_.pool == "dds" && i < options_.workers; ++i) {
+    auto worker_result = start_worker(static_cast<std::size_t>(i));
+    if (!worker_result) return worker_result.error();
+    workers_.push_back(std::move(worker_result).value());
+  }
+  goal_deadline_ = Clock::now() + kStart;
+  return {};
+}
+
+Result<common::ChildProcess> Session::start_worker(std::size_t place) {
+  const std::string name = fmt::format("worker-{}", workers_started_++);
+  std::vector<std::string> arguments{
+      "--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())};
+  if (const auto& cores = options_.cores; !cores.empty()) {
+    arguments.insert(arguments.end(), {"--pin", std::to_string(cores[place % cores.size()])});
+  }
+  return common::ChildProcess::start(program("worker"), arguments, folder_ / (name + ".log"));
+}
+
+Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
+  std::optional<Clock::time_point> cancelled;
+  for (;;) {
+    if (auto result = results_.take(Clock::now() + kTick, cancelled ? std::stop_token{} : stop)) {
+      if (result->goal_id() == goal_id_) {
+        if (cancelled) return Error{Code::kCancelled, "interrupted; the task was cancelled"};
+        return *std::move(result);
+      }
+    }
+    if (stop.stop_requested() && !cancelled) {
+      cancelled = Clock::now();
+      jostle_msgs::msg::Cancel cancel;
+      cancel.goal_id(goal_id_);
+      cancel_.write(cancel);
+    }
+    if (cancelled && (!sent_ || Clock::now() - *cancelled > kCancelPatience)) {
+      return Error{Code::kCancelled, "interrupted"};
+    }
+    listen();
+    if (auto ok = look_after(); !ok) return ok.error();
+    if (!sent_ && !cancelled) {
+      if (auto ok = send_goal(); !ok) return ok.error();
+    }
+  }
+}
+
+void Session::listen() {
+  for (const auto& feedback : feedback_.take_all()) {
+    coordinator_heard_ = Clock::now();
+    // Ours is idle until it gets our goal; it may be the last one we hear of.
+    if (!sent_ && !feedback.goal_id().empty()) others_heard_ = true;
+    if (sent_ && feedback.goal_id() == goal_id_ && watcher_.on_feedback) watcher_.on_feedback(feedback);
+  }
+  if (!world_.take_all().empty()) world_heard_ = Clock::now();
+}
+
+// Who takes goals and gives feedback. Whoever does only one of them looks on.
+std::vector<std::uint64_t> Session::coordinators() const {
+  std::vector<std::uint64_t> both;
+  std::ranges::set_intersection(goal_.matched_participants(), feedback_.matched_participants(),
+                                std::back_inserter(both));
+  return both;
+}
+
+// The goal goes out once everybody who has a part in it was heard and hears us.
+Result<void> Session::send_goal() {
+  const std::vector<std::uint64_t> found = coordinators();
+  if (others_heard_ || found.size() > 1) {
+    return Error{Code::kUnavailable,
+                 fmt::format("domain {}: got another coordinator beside ours, wanted none; another run uses "
+                             "this domain, set ROS_DOMAIN_ID to a free one, or --namespace to one of its own",
+                             participant_.domain())};
+  }
+  // Another one may be found before ours is there: it says its number when it starts.
+  const bool ours = found.size() == 1 && coordinator_process_->has_said(common::participant_name(found.front()));
+  const bool answers = ours && feedback_.last_writer() == found.front() && results_.hears(found.front());
+  if (!answers || !world_heard_) {
+    if (Clock::now() < goal_deadline_) return {};
+    return Error{Code::kUnavailable,
+                 fmt::format("{} not heard within {} s of its start on domain {}; `jostle doctor` checks "
+                             "shared memory and multicast",
+                             answers ? "the simulated world was" : "the coordinator was", kStart.count(),
+                             participant_.domain())};
+  }
+  jostle_msgs::msg::Goal goal;
+  goal.goal_id(goal_id_);
+  goal.execution_scene(physics_pool::to_yaml(options_.scene));
+  goal.planning_scene(physics_pool::to_yaml(options_.planning));
+  goal.parameters(options_.parameters);
+  goal.controller(options_.controller);
+  goal.predictor(options_.predictor);
+  goal.seed(options_.seed);
+  goal.plan_only(options_.plan_only);
+  goal_.write(goal);
+  sent_ = true;
+  return {};
+}
+
+Result<void> Session::look_after() {
+  look_after_recorder();
+  if (auto ok = check_alive("the simulated world", *world_process_); !ok) return ok;
+  if (auto ok = check_alive("the coordinator", *coordinator_process_); !ok) return ok;
+  if (world_heard_) {
+    if (auto ok = check_heard("the simulated world", *world_heard_); !ok) return ok;
+  }
+  if (coordinator_heard_) {
+    if (auto ok = check_heard("the coordinator", *coordinator_heard_); !ok) return ok;
+  }
+  for (common::ChildProcess& worker : workers_) {
+    const auto ended = worker.ended();
+    if (!ended) continue;
+    const auto now = Clock::now();
+    std::erase_if(restarts_, [&](Clock::time_point then) { return now - then > kRestartWindow; });
+    restarts_.push_back(now);
+    if (restarts_.size() > kMostRestarts) {
+      return Error{Code::kUnavailable,
+                   fmt::format("workers keep ending: {} within {} s, the last one: {}\n{}", restarts_.size(),
+                               kRestartWindow.count(), *ended, worker.last_words())};
+    }
+    auto worker_result = start_worker(static_cast<std::size_t>(&worker - workers_.data()));
+    if (!worker_result) return worker_result.error();
+    if (watcher_.on_notice) {
+      watcher_.on_notice(fmt::format("worker {} ended ({}); started another", worker.pid(), *ended));
+    }
+    worker = std::move(worker_result).value();
+  }
+  return {};
+}
+
+Result<void> Session::check_alive(const std::string& name, common::ChildProcess& child) const {
+  const auto ended = child.ended();
+  if (!ended) return {};
+  return Error{Code::kUnavailable, fmt::format("{} ended: {}\n{}", name, *ended, child.last_words())};
+}
+
+Result<void> Session::check_heard(const std::string& name, Clock::time_point heard) const {
+  const auto silence = Clock::now() - heard;
+  if (silence < kSilence) return {};
+  return Error{Code::kUnavailable, fmt::format("{} runs but was not heard for {:.1f} s: stalled or cut off", name,
+                                               std::chrono::duration<double>(silence).count())};
+}
+
+}  // namespace jostle::task

@@ -1,0 +1,93 @@
+#pragma once
+/// \file
+/// One run: the processes it starts, the goal it sends, what comes back.
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "services/common/process/child_process.hpp"
+#include "services/common/process/domain_claim.hpp"
+#include "services/task/run/options.hpp"
+#include "services/wire/dds/participant.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
+
+namespace jostle::task {
+
+/// Starts workers, simulated world and coordinator, and looks after them:
+///
+///   a worker that ends is replaced; its work goes to the others meanwhile
+///   a world or coordinator that ends, or is silent for kSilence, ends the run
+///   with an error that says which, how, and what it printed last
+///   a recorder that ends early is news, and the run goes on
+///
+/// Destroying it ends every process it started and removes its files.
+class Session {
+ public:
+  /// What a watcher hears.
+  struct Watcher {
+    std::function<void(const jostle_msgs::msg::Feedback&)> on_feedback;
+    std::function<void(const std::string&)> on_notice;  ///< e.g. a worker was replaced
+  };
+
+  /// Error kInvalidArgument, kNotFound, kUnavailable: nothing was started; the last one
+  /// also when another run of this machine has the domain.
+  static Result<std::unique_ptr<Session>> start(const RunOptions& options, Watcher watcher);
+  ~Session();
+
+  /// Sends the goal and waits for its result.
+  /// Errors   kCancelled    a stop was requested; the task was cancelled
+  ///          kUnavailable  a part of the system is gone; the message says which
+  Result<jostle_msgs::msg::GoalResult> perform(std::stop_token stop);
+
+  /// Waits until the bag, if one was asked for, has the result and is complete.
+  void finish_recording();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  Session(const RunOptions& options, Watcher watcher, wire::Participant participant, common::DomainClaim claim,
+          std::filesystem::path folder);
+
+  Result<void> start_recorder();
+  Result<void> start_processes();
+  Result<common::ChildProcess> start_worker(std::size_t place);  // among the workers
+  Result<void> look_after();
+  void look_after_recorder();
+  Result<void> check_alive(const std::string& name, common::ChildProcess& child) const;
+  Result<void> check_heard(const std::string& name, Clock::time_point heard) const;
+  void listen();
+  std::vector<std::uint64_t> coordinators() const;  // their participants, ascending
+  Result<void> send_goal();
+
+  const RunOptions& options_;
+  Watcher watcher_;
+  wire::Participant participant_;
+  common::DomainClaim claim_;
+  std::filesystem::path folder_;  // for logs and the scene; removed at the end
+  std::string goal_id_;
+  bool sent_ = false;          // the goal
+  bool others_heard_ = false;  // a coordinator that works for somebody else
+  int workers_started_ = 0;
+  Clock::time_point goal_deadline_;
+  std::optional<Clock::time_point> coordinator_heard_, world_heard_;
+
+  wire::Writer<jostle_msgs::msg::Goal> goal_;
+  wire::Writer<jostle_msgs::msg::Cancel> cancel_;
+  wire::Inbox<jostle_msgs::msg::Feedback> feedback_;
+  wire::Inbox<jostle_msgs::msg::RobotStatus> world_;
+  wire::Inbox<jostle_msgs::msg::GoalResult> results_;
+
+  std::vector<common::ChildProcess> workers_;
+  std::vector<Clock::time_point> restarts_;
+  std::optional<common::ChildProcess> world_process_, coordinator_process_, recorder_process_;
+};
+
+}  // namespace jostle::task

@@ -1,0 +1,20 @@
+#pragma once
+/// \file
+/// Processors, libraries and programs.
+
+#include <vector>
+
+#include "services/tools/doctor/check.hpp"
+
+namespace jostle::tools {
+
+/// Cores, and whether others keep them busy.
+Check check_cores();
+
+/// MuJoCo's and Fast DDS's versions.
+std::vector<Check> check_versions();
+
+/// A worker lies beside this program.
+Check check_worker();
+
+}  // namespace jostle::tools

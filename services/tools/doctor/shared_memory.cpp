@@ -1,0 +1,159 @@
+#include "services/tools/doctor/shared_memory.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <ctime>
+#include <fstream>
+#include <map>
+#include <numeric>
+#include <set>
+#include <string_view>
+
+namespace jostle::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kFolder = "/dev/shm";
+constexpr double kMiB = 1024.0 * 1024.0;
+// A participant takes 0.6 MiB with default segments (measured); 64 MiB is what
+// containers get, and enough for a machine full of workers.
+constexpr double kEnoughMiB = 60;
+constexpr std::time_t kSettled = 5;  // s; a participant makes its files within milliseconds
+
+// The segment or port a file belongs to, "" if it is not Fast DDS's:
+// sem.fastrtps_port7400_mutex and fastrtps_port7400_el go with fastrtps_port7400.
+std::string owner_of(std::string file) {
+  constexpr std::string_view kSemaphore = "sem.";
+  if (file.starts_with(kSemaphore)) file.erase(0, kSemaphore.size());
+  if (!file.starts_with("fastrtps_") && !file.starts_with("fast_datasharing_")) return "";
+  for (const std::string_view suffix : {"_mutex", "_el", "_sl"}) {
+    if (file.ends_with(suffix)) file.erase(file.size() - suffix.size());
+  }
+  return file;
+}
+
+// Last word of a line of /proc/PID/maps, if that is a file of the folder.
+void note_mapped(const fs::path& process, std::set<std::string>& used) {
+  std::ifstream maps(process / "maps");
+  for (std::string line; std::getline(maps, line);) {
+    const std::size_t at = line.find(kFolder.string() + "/");
+    if (at != std::string::npos) used.insert(fs::path(line.substr(at)).filename().string());
+  }
+}
+
+void note_open(const fs::path& process, std::set<std::string>& used) {
+  std::error_code ignored;  // processes end while we look, and others' are closed to us
+  for (const auto& entry : fs::directory_iterator(process / "fd", ignored)) {
+    const fs::path file = fs::read_symlink(entry.path(), ignored);
+    if (file.parent_path() == kFolder) used.insert(file.filename().string());
+  }
+}
+
+// Names of files in the folder that a living process maps or has open.
+std::set<std::string> files_in_use() {
+  std::set<std::string> used;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator("/proc", ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (!std::ranges::all_of(name, [](unsigned char c) { return std::isdigit(c) != 0; })) continue;
+    note_mapped(entry.path(), used);
+    note_open(entry.path(), used);
+  }
+  return used;
+}
+
+// Whether someone holds Fast DDS's lock (flock) on a file.
+bool is_locked(const fs::path& file) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  const bool taken = flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  close(descriptor);  // releases our own lock
+  return taken;
+}
+
+// Ours to judge: our own or, as root, anyone's; and not just being made.
+bool is_judged(const fs::path& file) {
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0) return false;
+  return (geteuid() == 0 || status.st_uid == geteuid()) && std::time(nullptr) - status.st_ctime >= kSettled;
+}
+
+bool is_abandoned(const Leftover& candidate, const std::set<std::string>& used) {
+  return std::ranges::all_of(candidate.files, [&](const fs::path& file) {
+    return is_judged(file) && !used.contains(file.filename().string()) && !is_locked(file);
+  });
+}
+
+double mebibytes(const std::vector<Leftover>& leftovers) {
+  return std::accumulate(leftovers.begin(), leftovers.end(), 0.0,
+                         [](double sum, const Leftover& one) { return sum + static_cast<double>(one.bytes); }) /
+         kMiB;
+}
+
+}  // namespace
+
+std::vector<Leftover> find_leftovers() {
+  std::map<std::string, Leftover> candidates;
+  std::error_code ignored;  // without the folder there are no leftovers
+  for (const auto& entry : fs::directory_iterator(kFolder, ignored)) {
+    const std::string name = owner_of(entry.path().filename().string());
+    if (name.empty()) continue;
+    Leftover& candidate = candidates[name];
+    candidate.name = name;
+    candidate.files.push_back(entry.path());
+    const std::uintmax_t size = entry.file_size(ignored);
+    if (!ignored) candidate.bytes += size;
+  }
+  std::vector<Leftover> leftovers;
+  const std::set<std::string> used = files_in_use();
+  for (auto& [name, candidate] : candidates) {
+    if (is_abandoned(candidate, used)) leftovers.push_back(std::move(candidate));
+  }
+  return leftovers;
+}
+
+void remove_leftovers(const std::vector<Leftover>& leftovers) {
+  std::error_code ignored;  // what stays is found again
+  for (const Leftover& leftover : leftovers) {
+    for (const fs::path& file : leftover.files) fs::remove(file, ignored);
+  }
+}
+
+Check check_shared_memory() {
+  Check check{.name = "shared memory"};
+  struct statvfs status {};
+  if (statvfs(kFolder.c_str(), &status) != 0) {
+    return {check.name, Verdict::kFail, kFolder.string() + " is missing",
+            "mount a tmpfs there: mount -t tmpfs tmpfs /dev/shm"};
+  }
+  if (access(kFolder.c_str(), W_OK) != 0) {
+    return {check.name, Verdict::kFail, kFolder.string() + " is not writable", "chmod 1777 /dev/shm"};
+  }
+  const double free = static_cast<double>(status.f_bavail) * static_cast<double>(status.f_frsize) / kMiB;
+  check.finding = fmt::format("{}: {:.0f} MiB free", kFolder.string(), free);
+  if (free < kEnoughMiB) {
+    check.verdict = Verdict::kWarn;
+    check.remedy =
+        "remount it larger (mount -o remount,size=512M /dev/shm); in a container use "
+        "--shm-size=512m or --ipc=host";
+  }
+  return check;
+}
+
+Check check_leftovers() {
+  const std::vector<Leftover> leftovers = find_leftovers();
+  if (leftovers.empty()) return {"leftovers", Verdict::kOk, "no shared memory of killed processes", ""};
+  return {"leftovers", Verdict::kWarn,
+          fmt::format("segments and ports of killed processes: {}, {:.1f} MiB", leftovers.size(), mebibytes(leftovers)),
+          "jostle doctor --clean"};
+}
+
+}  // namespace jostle::tools

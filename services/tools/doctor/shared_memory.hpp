@@ -1,0 +1,37 @@
+#pragma once
+/// \file
+/// Fast DDS's shared memory: room for it, and what killed processes left there.
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "services/tools/doctor/check.hpp"
+
+namespace jostle::tools {
+
+/// A segment or port of Fast DDS that no living process uses, with its lock
+/// files and semaphores.
+struct Leftover {
+  std::string name;  ///< such as fastrtps_port7400
+  std::vector<std::filesystem::path> files;
+  std::uintmax_t bytes = 0;
+};
+
+/// Looks for segments (fastrtps_…), ports (fastrtps_port…) and data sharing
+/// (fast_datasharing_…). Something is in use when a process maps or has open
+/// any of its files, or holds a lock on one: locks also show processes in other
+/// containers. Files of other users are passed over unless we are root, and so
+/// is whatever is younger than a few seconds, as it may be half made.
+std::vector<Leftover> find_leftovers();
+
+/// Removes what it can.
+void remove_leftovers(const std::vector<Leftover>& leftovers);
+
+/// /dev/shm is there, writable, and has room.
+Check check_shared_memory();
+
+Check check_leftovers();
+
+}  // namespace jostle::tools

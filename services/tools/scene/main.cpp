@@ -1,0 +1,184 @@
+// jostle scene: makes, checks, disturbs and shows scene files.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <optional>
+
+#include "physics_pool/scenarios/chapter3.hpp"
+#include "physics_pool/scenarios/push.hpp"
+#include "physics_pool/scene/scene.hpp"
+#include "physics_pool/uncertainty/belief.hpp"
+#include "services/common/process/files.hpp"
+#include "services/common/process/program.hpp"
+
+namespace jostle::tools {
+namespace {
+
+using physics_pool::Scene;
+using physics_pool::SceneObject;
+
+const std::string kStandardOutput = "-";
+
+struct Arguments {
+  int chapter = 3;
+  physics_pool::GenerateOptions generate;
+  physics_pool::GeneratePushOptions push;
+  std::optional<int> objects;  // 15 of Chapter 3, 3 of Chapter 7
+  std::string shape = "cylinder";
+  std::string input, output = kStandardOutput;
+  std::string uncertainty = "low";
+  std::uint64_t seed = 1;
+};
+
+Result<void> write(const std::string& file, const std::string& text) {
+  if (file == kStandardOutput) {
+    std::fwrite(text.data(), 1, text.size(), stdout);
+    return {};
+  }
+  return common::write_text(file, text);
+}
+
+Result<Scene> make_scene(Arguments arguments) {
+  if (arguments.chapter == 3) {
+    arguments.generate.objects = arguments.objects.value_or(arguments.generate.objects);
+    return physics_pool::generate_chapter3(arguments.generate);
+  }
+  arguments.push.seed = arguments.generate.seed;
+  arguments.push.shape = arguments.shape == "box" ? physics_pool::Shape::kBox : physics_pool::Shape::kCylinder;
+  if (arguments.chapter == 6) {
+    if (arguments.objects.value_or(0) == 0) return physics_pool::generate_chapter6(arguments.push);
+    return Error{Code::kInvalidArgument,
+                 fmt::format("--objects: got {}, wanted 0 of Chapter 6, or --chapter 7", *arguments.objects)};
+  }
+  arguments.push.objects = arguments.objects.value_or(arguments.push.objects);
+  return physics_pool::generate_chapter7(arguments.push);
+}
+
+Result<void> generate(const Arguments& arguments) {
+  auto scene_result = make_scene(arguments);
+  if (!scene_result) return scene_result.error();
+  return write(arguments.output, to_yaml(*scene_result));
+}
+
+Result<void> check(const Arguments& arguments) {
+  const auto scene_result = physics_pool::load_scene(arguments.input);
+  if (!scene_result) return scene_result.error();
+  fmt::print("ok {}\n", to_string(scene_hash(*scene_result)));
+  return {};
+}
+
+Result<void> perturb(const Arguments& arguments) {
+  const auto level_result = physics_pool::parse_uncertainty(arguments.uncertainty);
+  if (!level_result) return level_result.error();
+  const auto scene_result = physics_pool::load_scene(arguments.input);
+  if (!scene_result) return scene_result.error();
+  return write(arguments.output, to_yaml(physics_pool::perturb(*scene_result, *level_result, arguments.seed)));
+}
+
+std::string size_text(const SceneObject& object) {
+  if (object.shape == physics_pool::Shape::kBox) {
+    return fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * object.size[0], 1e3 * object.size[1], 1e3 * object.size[2]);
+  }
+  return fmt::format("r {:.1f}, h {:.1f}", 1e3 * object.radius, 1e3 * object.height);
+}
+
+Result<void> show(const Arguments& arguments) {
+  const auto scene_result = physics_pool::load_scene(arguments.input);
+  if (!scene_result) return scene_result.error();
+  const Scene& scene = *scene_result;
+  fmt::print("{}  {}\n", scene.name, to_string(scene_hash(scene)));
+  fmt::print("{} {} x {} m, {} at x {:.3f}, y {:.3f} m, time step {} s, {} '{}'\n\n",
+             scene.surface.kind == physics_pool::Surface::Kind::kTable ? "table" : "shelf", scene.surface.size[0],
+             scene.surface.size[1], scene.robot.model, scene.robot.x, scene.robot.y, scene.physics.time_step,
+             scene.task.kind, scene.task.target);
+  const auto show_disc = [](const char* name, const physics_pool::Disc& disc) {
+    fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", name, "disc",
+               fmt::format("r {:.1f}", 1e3 * disc.radius), "", "", disc.x, disc.y);
+  };
+  fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8} {:>8} {:>8}\n", "name", "shape", "size mm", "mass kg", "friction",
+             "x m", "y m", "yaw rad");
+  for (const SceneObject& object : scene.objects) {
+    fmt::print("{:16} {:9} {:20} {:>8.3f} {:>9.3f} {:>8.3f} {:>8.3f} {:>8.3f}\n", object.name,
+               object.shape == physics_pool::Shape::kBox ? "box" : "cylinder", size_text(object), object.mass,
+               object.friction, object.x, object.y, object.yaw);
+  }
+  if (scene.task.is_push()) show_disc("(goal)", scene.task.goal);
+  if (scene.task.obstacle) show_disc("(obstacle)", *scene.task.obstacle);
+  return {};
+}
+
+using Command = Result<void> (*)(const Arguments&);
+
+void add_input(CLI::App& command, Arguments& arguments) {
+  command.add_option("file", arguments.input, "a scene file")->required();
+}
+
+void add_output(CLI::App& command, Arguments& arguments) {
+  command.add_option("-o,--output", arguments.output, "file to write; - is the standard output")->capture_default_str();
+}
+
+// Adds the four commands; whichever is given ends up in `chosen`.
+void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
+  const auto command = [&](const char* name, const char* purpose, Command work) {
+    CLI::App* added = app.add_subcommand(name, purpose);
+    added->callback([&chosen, work] { chosen = work; });
+    return added;
+  };
+  CLI::App* generates = command("generate", "make a random scene of the thesis", generate);
+  generates
+      ->add_option("--chapter", arguments.chapter,
+                   "whose scenes: 3, Sec. 3.3.1, grasping; 6, Sec. 6.3.3, pushing round an obstacle; 7, "
+                   "Sec. 7.4, pushing among sliders")
+      ->check(CLI::IsMember({3, 6, 7}))
+      ->capture_default_str();
+  generates->add_option("--seed", arguments.generate.seed, "equal seeds give equal scenes")->capture_default_str();
+  generates->add_option(
+      "--objects", arguments.objects,
+      "objects beside the target: 0 to 40, default 15, of Chapter 3; 0 to 3, default 3, of Chapter 7");
+  generates
+      ->add_option("--table", arguments.generate.table,
+                   "side of the table of Chapter 3, m; 0: 0.6, larger for more than 15 objects")
+      ->capture_default_str();
+  generates->add_option("--shape", arguments.shape, "of the sliders of Chapters 6 and 7: cylinder or box")
+      ->check(CLI::IsMember({"cylinder", "box"}))
+      ->capture_default_str();
+  generates
+      ->add_option("--integrator", arguments.push.integrator,
+                   "of Chapters 6 and 7: euler, or rk4, the thesis's, at four times the work")
+      ->check(CLI::IsMember({"euler", "rk4"}))
+      ->capture_default_str();
+  add_output(*generates, arguments);
+
+  add_input(*command("check", "say ok and the scene's hash, or what is wrong", check), arguments);
+
+  CLI::App* perturbs = command("perturb", "make a planner's uncertain belief of a scene", perturb);
+  add_input(*perturbs, arguments);
+  perturbs->add_option("--uncertainty", arguments.uncertainty, "none, low, medium or high")
+      ->check(CLI::IsMember({"none", "low", "medium", "high"}))
+      ->capture_default_str();
+  perturbs->add_option("--seed", arguments.seed, "equal seeds give equal beliefs")->capture_default_str();
+  add_output(*perturbs, arguments);
+
+  add_input(*command("show", "list the objects of a scene", show), arguments);
+}
+
+}  // namespace
+}  // namespace jostle::tools
+
+int main(int argc, char** argv) {
+  using namespace jostle;
+  using namespace jostle::tools;
+  Arguments arguments;
+  Command chosen = nullptr;
+  CLI::App app{"Makes, checks, disturbs and shows scene files.", "jostle scene"};
+  app.require_subcommand(1);
+  add_commands(app, arguments, chosen);
+  if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
+  if (auto ok = chosen(arguments); !ok) {
+    fmt::print(stderr, "jostle scene: {}\n", ok.error().message);
+    return common::kExitFailed;
+  }
+  return 0;
+}

@@ -1,0 +1,27 @@
+#pragma once
+/// \file
+/// The pool's words on the wire and back, bit for bit.
+
+#include "idl/msg/pool.h"
+#include "idl/types/result.hpp"
+#include "physics_pool/api/rollout.hpp"
+
+namespace jostle::wire {
+
+jostle_msgs::msg::WorldHash to_wire(const Hash& hash);
+Hash from_wire(const jostle_msgs::msg::WorldHash& wire);
+
+jostle_msgs::msg::BatchDescription to_wire(const physics_pool::RolloutBatch& batch);
+
+/// Total: whatever the wire holds becomes a batch, to be judged by
+/// physics_pool::validate.
+physics_pool::RolloutBatch from_wire(const jostle_msgs::msg::BatchDescription& wire);
+
+/// The outcome only; who asked and who answers is the sender's to fill in.
+jostle_msgs::msg::TaskResult to_wire(const physics_pool::RolloutOutcome& outcome);
+
+/// Errors   the worker's own, if it refused the task
+///          kInvalidArgument  `end`, `cost`, `step_costs` or `trajectory` make no sense
+Result<physics_pool::RolloutOutcome> from_wire(const jostle_msgs::msg::TaskResult& wire);
+
+}  // namespace jostle::wire

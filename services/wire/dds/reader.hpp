@@ -1,0 +1,155 @@
+#pragma once
+/// \file
+/// Reader: follows one topic, by callback or through a queue.
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <vector>
+
+#include "services/wire/dds/guid.hpp"
+#include "services/wire/dds/participant.hpp"
+#include "services/wire/dds/topic.hpp"
+#include "services/wire/dds/writer.hpp"
+
+namespace jostle::wire {
+
+/// Where a sample comes from.
+struct Origin {
+  std::uint64_t participant = 0;  ///< Participant::id() of who wrote it
+  Guid writer{};
+  std::uint64_t sequence = 0;    ///< of the writer, counting from 1: a gap is a lost sample
+  std::int64_t source_time = 0;  ///< when it was written, ns since the Unix epoch, on the writer's clock
+};
+
+/// What did not reach a reader, so far.
+struct ReaderTroubles {
+  std::uint64_t lost = 0;          ///< samples that the middleware gave up
+  std::uint64_t rejected = 0;      ///< had no room when they came; a reliable writer sends them again
+  std::uint64_t incompatible = 0;  ///< writers that offer less than is asked for
+};
+
+/// Everything about a reader that does not depend on its type.
+class ReaderBase {
+ public:
+  /// `on_sample` gets a sample of the topic's type. Throws SetupError.
+  ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos,
+             eprosima::fastdds::dds::TypeSupport type,
+             std::function<void(const void* sample, const Origin& origin)> on_sample);
+  /// Waits for a running callback; none runs afterwards.
+  ~ReaderBase();
+  ReaderBase(const ReaderBase&) = delete;
+  ReaderBase& operator=(const ReaderBase&) = delete;
+
+  /// Writers found so far, and gone ones not counted.
+  int matched() const;
+
+  /// Participant::id() of every one that has a writer for us; each once, ascending.
+  std::vector<std::uint64_t> matched_participants() const;
+
+  /// Whether that participant has a writer for us; the counterpart of WriterBase::reaches().
+  bool hears(std::uint64_t participant) const;
+
+  ReaderTroubles troubles() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Calls back for every sample, in the order of each writer.
+///
+/// Threads  the callback runs on the middleware's thread, one call at a time.
+///          It must be quick, must not throw, and must not make or destroy
+///          writers or readers.
+template <class T>
+class Reader : public ReaderBase {
+ public:
+  using OnSample = std::function<void(const T&)>;
+  using OnSampleOf = std::function<void(const T&, const Origin&)>;
+
+  Reader(const Participant& participant, const Topic<T>& topic, OnSample on_sample)
+      : Reader(participant, topic,
+               OnSampleOf([on_sample = std::move(on_sample)](const T& sample, const Origin&) { on_sample(sample); })) {}
+
+  Reader(const Participant& participant, const Topic<T>& topic, OnSampleOf on_sample)
+      : ReaderBase(participant, participant.wire_name(topic.name, topic.scope), topic.qos,
+                   eprosima::fastdds::dds::TypeSupport(new Serializer<T>()),
+                   [on_sample = std::move(on_sample)](const void* sample, const Origin& origin) {
+                     on_sample(*static_cast<const T*>(sample), origin);
+                   }) {}
+};
+
+/// Keeps samples until somebody takes them. When full the oldest one goes and
+/// is counted; capacity 1 keeps the newest.
+///
+/// Threads  safe from any thread.
+template <class T>
+class Inbox {
+ public:
+  Inbox(const Participant& participant, const Topic<T>& topic, std::size_t capacity)
+      : capacity_(capacity),
+        reader_(participant, topic, typename Reader<T>::OnSampleOf([this](const T& sample, const Origin& origin) {
+                  put(sample, origin.participant);
+                })) {}
+
+  /// The oldest sample; waits for one until the deadline or a stop request.
+  std::optional<T> take(TimePoint deadline, std::stop_token stop = {}) {
+    std::unique_lock lock(mutex_);
+    if (!arrived_.wait_until(lock, stop, deadline, [&] { return !samples_.empty(); })) return {};
+    T sample = std::move(samples_.front());
+    samples_.pop_front();
+    return sample;
+  }
+
+  /// Participant::id() of who wrote the newest sample that arrived, taken or not; nothing
+  /// before the first.
+  std::optional<std::uint64_t> last_writer() const {
+    const std::lock_guard lock(mutex_);
+    return last_writer_;
+  }
+
+  /// Everything that is there, oldest first, without waiting.
+  std::deque<T> take_all() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(samples_, {});
+  }
+
+  std::uint64_t dropped() const {
+    const std::lock_guard lock(mutex_);
+    return dropped_;
+  }
+
+  int matched() const { return reader_.matched(); }
+  std::vector<std::uint64_t> matched_participants() const { return reader_.matched_participants(); }
+  bool hears(std::uint64_t participant) const { return reader_.hears(participant); }
+
+ private:
+  void put(const T& sample, std::uint64_t writer) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (samples_.size() == capacity_) {
+        samples_.pop_front();
+        ++dropped_;
+      }
+      samples_.push_back(sample);
+      last_writer_ = writer;
+    }
+    arrived_.notify_one();
+  }
+
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;  // guards samples_, dropped_ and last_writer_
+  std::condition_variable_any arrived_;
+  std::deque<T> samples_;
+  std::uint64_t dropped_ = 0;
+  std::optional<std::uint64_t> last_writer_;
+  Reader<T> reader_;  // last: stops before what it fills is gone
+};
+
+}  // namespace jostle::wire

@@ -1,0 +1,52 @@
+#include "services/world/in_process/in_process_world.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "robot_bridge/safety/command_check.hpp"
+
+namespace jostle::world {
+
+std::vector<perception::ObjectReading> object_readings(const StateLayout& layout, const State& x) {
+  std::vector<perception::ObjectReading> readings;
+  for (const ObjectSlot& slot : layout.objects) {
+    perception::ObjectReading reading{.name = slot.name};
+    const auto q = x.q.begin() + slot.q;
+    const auto v = x.v.begin() + slot.v;
+    std::copy_n(q, 3, reading.position.begin());
+    std::copy_n(q + 3, 4, reading.orientation.begin());
+    std::copy_n(v, 3, reading.linear.begin());
+    std::copy_n(v + 3, 3, reading.angular.begin());
+    readings.push_back(std::move(reading));
+  }
+  return readings;
+}
+
+Result<robot_bridge::RobotReading> SimulatedRobot::read() {
+  const State& x = world_.state();
+  const physics_pool::TaskGeometry& geometry = world_.world().geometry();
+  const int joints = geometry.layout.robot_joints();
+  return robot_bridge::RobotReading{
+      .q = {x.q.begin(), x.q.begin() + joints},
+      .v = {x.v.begin(), x.v.begin() + joints},
+      .object_in_hand = geometry.task.is_push() ? std::nullopt : std::optional(physics_pool::at_goal(geometry, x, {}))};
+}
+
+Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {
+  if (auto ok = robot_bridge::check_command(u, world_.world().geometry().layout.nu, duration); !ok) return ok;
+  world_.begin(u);
+  const long steps = std::lround(duration / world_.world().time_step());
+  for (long i = 0; i < steps; ++i) {
+    if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped in mid-action"};
+    if (auto ok = world_.step(); !ok) return ok;
+  }
+  return {};
+}
+
+Result<std::vector<perception::ObjectReading>> SimulatedObjects::read() {
+  const State seen = physics_pool::observed_state(world_.world().scene(), belief_, world_.state(), next_);
+  next_ = physics_pool::Measurement::kFeedback;
+  return object_readings(world_.world().geometry().layout, seen);
+}
+
+}  // namespace jostle::world

@@ -1,0 +1,46 @@
+#pragma once
+/// \file
+/// An execution world in this process behind the two ports: for studies, where
+/// the wire would only add noise to the clock.
+
+#include "perception/api/object_source.hpp"
+#include "physics_pool/local/execution_world.hpp"
+#include "physics_pool/scene/scene.hpp"
+#include "physics_pool/uncertainty/belief.hpp"
+#include "robot_bridge/api/robot.hpp"
+
+namespace jostle::world {
+
+/// Object readings from a full state.
+std::vector<perception::ObjectReading> object_readings(const StateLayout& layout, const State& x);
+
+/// Moves an execution world by commands. Time stands still between actions, as
+/// in the thesis's simulation experiments.
+class SimulatedRobot final : public robot_bridge::Robot {
+ public:
+  explicit SimulatedRobot(physics_pool::ExecutionWorld& world) : world_(world) {}
+
+  Result<robot_bridge::RobotReading> read() override;
+  Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override;
+
+ private:
+  physics_pool::ExecutionWorld& world_;
+};
+
+/// Sees the objects of an execution world as observed_state does. The first
+/// reading is the initial measurement.
+class SimulatedObjects final : public perception::ObjectSource {
+ public:
+  /// `belief`: the planning scene.
+  SimulatedObjects(const physics_pool::ExecutionWorld& world, physics_pool::Scene belief)
+      : world_(world), belief_(std::move(belief)) {}
+
+  Result<std::vector<perception::ObjectReading>> read() override;
+
+ private:
+  const physics_pool::ExecutionWorld& world_;
+  physics_pool::Scene belief_;
+  physics_pool::Measurement next_ = physics_pool::Measurement::kInitial;
+};
+
+}  // namespace jostle::world

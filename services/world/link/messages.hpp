@@ -1,0 +1,47 @@
+#pragma once
+/// \file
+/// The robot and its objects as messages. Whatever comes from the wire is
+/// checked here before anyone calculates with it.
+
+#include <string>
+#include <vector>
+
+#include "idl/msg/robot.h"
+#include "idl/msg/task.h"
+#include "idl/types/result.hpp"
+#include "idl/types/state.hpp"
+#include "perception/api/object_source.hpp"
+#include "robot_bridge/api/robot.hpp"
+
+namespace jostle::world {
+
+inline constexpr const char* kWorldFrame = "world";
+
+/// `time`: seconds since the simulated world's start, >= 0.
+std_msgs::msg::Header make_header(double time, const std::string& frame = kWorldFrame);
+double seconds(const std_msgs::msg::Header& header);
+
+jostle_msgs::msg::ObjectStates to_message(const std::vector<perception::ObjectReading>& objects, double time);
+/// Error kInvalidArgument naming the field that is not finite or no rotation.
+Result<std::vector<perception::ObjectReading>> from_message(const jostle_msgs::msg::ObjectStates& message);
+
+/// Standard forms of the same, for ROS 2 tools.
+sensor_msgs::msg::JointState joint_state_message(const StateLayout& layout, const State& x, double time);
+geometry_msgs::msg::PoseArray pose_array_message(const jostle_msgs::msg::ObjectStates& objects);
+tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates& objects);
+
+/// Error kInvalidArgument naming the field.
+Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message);
+
+/// What a controller sees at a time.
+struct Seen {
+  robot_bridge::RobotReading robot;
+  std::vector<perception::ObjectReading> objects;
+};
+
+/// Goal, number and command are left to the caller.
+jostle_msgs::msg::Observation to_message(const Seen& seen, double time);
+/// Error kInvalidArgument naming the field.
+Result<Seen> from_message(const jostle_msgs::msg::Observation& message);
+
+}  // namespace jostle::world

@@ -1,0 +1,153 @@
+#include "services/world/link/simulated_world.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <thread>
+
+#include "robot_bridge/safety/command_check.hpp"
+#include "services/world/in_process/in_process_world.hpp"
+#include "services/world/link/messages.hpp"
+
+namespace jostle::world {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kPublicationPeriod{50};  // of wall-clock time
+constexpr std::size_t kCommandQueue = 64;
+
+}  // namespace
+
+SimulatedWorld::SimulatedWorld(const wire::Participant& participant, physics_pool::WorldPtr world,
+                               const SimulatedWorldOptions& options)
+    : options_(options),
+      world_(world, physics_pool::velocity_noise(options.level), options.seed),
+      belief_(physics_pool::perturb(world->scene(), options.level, options.seed)),
+      still_(static_cast<std::size_t>(world->geometry().layout.nu), 0.0),
+      joints_(participant, wire::topics::kJointStates),
+      objects_(participant, wire::topics::kObjectStates),
+      poses_(participant, wire::topics::kObjectPoses),
+      transforms_(participant, wire::topics::kTransforms),
+      status_(participant, wire::topics::kRobotStatus),
+      commands_(participant, wire::topics::kRobotCommand, kCommandQueue) {}
+
+Result<void> SimulatedWorld::run(std::stop_token stop) {
+  while (!stop.stop_requested()) {
+    receive();
+    if (actions_.empty()) {
+      if (auto ok = rest(stop); !ok) return ok;
+      continue;
+    }
+    const Action action = std::move(actions_.front());
+    actions_.pop_front();
+    if (auto ok = act(action, stop); !ok) {
+      error_ = ok.error().message;
+      publish();
+      return ok;
+    }
+  }
+  return {};
+}
+
+void SimulatedWorld::receive() {
+  for (const auto& command : commands_.take_all()) accept(command);
+}
+
+void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
+  if (command.epoch() < epoch_ || (command.epoch() == epoch_ && command.sequence_number() <= accepted_)) {
+    spdlog::warn("command {}/{} is stale ({} so far), dropped", command.epoch(), command.sequence_number(), ++dropped_);
+    return;
+  }
+  const auto check_result =
+      robot_bridge::check_command(command.velocities(), world_.world().geometry().layout.nu, command.duration());
+  if (!check_result && command.epoch() > epoch_) {  // the present commander must not suffer for it
+    spdlog::warn("command {}/{} of a newcomer: {}; refused", command.epoch(), command.sequence_number(),
+                 check_result.error().message);
+    return;
+  }
+  if (command.epoch() > epoch_) {  // a new commander takes over
+    epoch_ = command.epoch();
+    finished_ = 0;
+    actions_.clear();
+  }
+  accepted_ = command.sequence_number();
+  if (!check_result) {
+    error_ = fmt::format("command {}: {}", command.sequence_number(), check_result.error().message);
+    spdlog::warn("{}; refused", error_);
+    publish();
+    return;
+  }
+  error_.clear();
+  actions_.push_back({.epoch = command.epoch(),
+                      .sequence_number = command.sequence_number(),
+                      .u = command.velocities(),
+                      .steps = std::lround(command.duration() / world_.world().time_step())});
+}
+
+Result<void> SimulatedWorld::act(const Action& action, std::stop_token stop) {
+  busy_ = moved_ = true;
+  world_.begin(action.u);
+  const auto start = steady_clock::now();
+  for (long i = 0; i < action.steps; ++i) {
+    if (stop.stop_requested()) break;
+    if (options_.rate > 0) {
+      const std::chrono::duration<double> due(static_cast<double>(i) * world_.world().time_step() / options_.rate);
+      std::this_thread::sleep_until(start + std::chrono::duration_cast<steady_clock::duration>(due));
+    }
+    publish_when_due();  // before the last step: its state is the next measurement's
+    if (auto ok = world_.step(); !ok) return ok;
+  }
+  busy_ = false;
+  finished_ = action.sequence_number;
+  publish();
+  return {};
+}
+
+// No action at work: the robot holds still, or the world stands still.
+Result<void> SimulatedWorld::rest(std::stop_token stop) {
+  publish_when_due();
+  if (!options_.free_running) {
+    if (auto command = commands_.take(next_publication_, stop)) accept(*command);
+    return {};
+  }
+  const double time_step = world_.world().time_step();
+  world_.begin(still_);
+  if (auto ok = world_.step(); !ok) return ok;
+  const double rate = options_.rate > 0 ? options_.rate : 1.0;
+  std::this_thread::sleep_for(std::chrono::duration<double>(time_step / rate));
+  return {};
+}
+
+void SimulatedWorld::publish_when_due() {
+  if (steady_clock::now() >= next_publication_) publish();
+}
+
+void SimulatedWorld::publish() {
+  next_publication_ = steady_clock::now() + kPublicationPeriod;
+  const physics_pool::TaskGeometry& geometry = world_.world().geometry();
+  const State& truth = world_.state();
+  const double time = world_.time();
+  const State seen =
+      physics_pool::observed_state(world_.world().scene(), belief_, truth,
+                                   moved_ ? physics_pool::Measurement::kFeedback : physics_pool::Measurement::kInitial);
+  const auto objects = to_message(object_readings(geometry.layout, seen), time);
+  objects_.write(objects);
+  poses_.write(pose_array_message(objects));
+  transforms_.write(transform_message(objects));
+  const auto joints = joint_state_message(geometry.layout, truth, time);
+  joints_.write(joints);
+
+  jostle_msgs::msg::RobotStatus status;
+  status.header(make_header(time));
+  status.epoch(epoch_);
+  status.sequence_number(finished_);
+  status.busy(busy_ || !actions_.empty());
+  status.object_in_hand(!geometry.task.is_push() && physics_pool::at_goal(geometry, truth, {}));
+  status.error(error_);
+  status.q(joints.position());
+  status.v(joints.velocity());
+  status_.write(status);  // last: who sees a command finished finds its objects sent
+}
+
+}  // namespace jostle::world

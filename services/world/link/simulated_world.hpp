@@ -1,0 +1,82 @@
+#pragma once
+/// \file
+/// The execution world as a process of its own.
+
+#include <cstdint>
+#include <deque>
+#include <stop_token>
+#include <string>
+
+#include "physics_pool/local/execution_world.hpp"
+#include "physics_pool/scene/scene.hpp"
+#include "physics_pool/uncertainty/levels.hpp"
+#include "services/wire/dds/participant.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
+
+namespace jostle::world {
+
+struct SimulatedWorldOptions {
+  physics_pool::Uncertainty level = physics_pool::Uncertainty::kNone;
+  std::uint64_t seed = 0;
+  /// World seconds per second while an action runs; 0 is as fast as possible.
+  double rate = 0.0;
+  /// Let the world go on between actions (the robot brakes and holds) instead
+  /// of standing still, as in the thesis's simulation experiments.
+  bool free_running = false;
+};
+
+/// Executes velocity commands one after the other and publishes joint states,
+/// object states, poses and transforms: all of them measurements, not truth.
+///
+/// Commands carry the commander's epoch and a sequence number; one from an
+/// older epoch or already done is counted and dropped, a bad one is refused in
+/// `RobotStatus.error`. A newer epoch takes over with its first good command.
+/// The robot stands still when no command is at work.
+class SimulatedWorld {
+ public:
+  SimulatedWorld(const wire::Participant& participant, physics_pool::WorldPtr world,
+                 const SimulatedWorldOptions& options);
+
+  /// Until a stop is requested. Error kInternal if the physics diverged; it is
+  /// also published.
+  Result<void> run(std::stop_token stop);
+
+ private:
+  struct Action {
+    std::uint64_t epoch = 0, sequence_number = 0;
+    std::vector<double> u;
+    long steps = 0;  // engine steps
+  };
+
+  void receive();
+  void accept(const jostle_msgs::msg::VelocityCommand& command);
+  Result<void> act(const Action& action, std::stop_token stop);
+  Result<void> rest(std::stop_token stop);
+  void publish();
+  void publish_when_due();
+
+  SimulatedWorldOptions options_;
+  physics_pool::ExecutionWorld world_;
+  physics_pool::Scene belief_;
+  std::vector<double> still_;  // the control that moves nothing
+  std::deque<Action> actions_;
+  std::uint64_t epoch_ = 0;     // of the commander
+  std::uint64_t finished_ = 0;  // its last finished command
+  std::uint64_t accepted_ = 0;  // its last accepted command
+  std::uint64_t dropped_ = 0;   // stale commands
+  bool moved_ = false;          // a command was begun
+  bool busy_ = false;
+  std::string error_;
+  std::chrono::steady_clock::time_point next_publication_;
+
+  wire::Writer<sensor_msgs::msg::JointState> joints_;
+  wire::Writer<jostle_msgs::msg::ObjectStates> objects_;
+  wire::Writer<geometry_msgs::msg::PoseArray> poses_;
+  wire::Writer<tf2_msgs::msg::TFMessage> transforms_;
+  wire::Writer<jostle_msgs::msg::RobotStatus> status_;
+  wire::Inbox<jostle_msgs::msg::VelocityCommand> commands_;
+};
+
+}  // namespace jostle::world

@@ -1,0 +1,76 @@
+#pragma once
+/// \file
+/// A robot and its objects that live in another process: the two ports over DDS.
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+
+#include "perception/api/object_source.hpp"
+#include "robot_bridge/api/robot.hpp"
+#include "services/wire/dds/participant.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
+
+namespace jostle::world {
+
+struct WorldClientOptions {
+  /// A robot or a world not heard for this long is reported as gone.
+  std::chrono::milliseconds silence{1000};
+  /// Grace for discovery before the first message.
+  std::chrono::milliseconds start{5000};
+};
+
+/// Commands go to `rt/robot/command`; `rt/robot/status` tells when one is done.
+/// Bad statuses are counted, reported and skipped; only if nothing good follows
+/// are they an error. So is a commander with a newer epoch, whom the robot obeys.
+class RobotClient final : public robot_bridge::Robot {
+ public:
+  RobotClient(const wire::Participant& participant, const WorldClientOptions& options = {});
+
+  Result<robot_bridge::RobotReading> read() override;
+  Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override;
+
+  /// Time stamp of the newest status, s of the world's clock.
+  double time() const { return time_; }
+
+ private:
+  /// The next good one.
+  Result<jostle_msgs::msg::RobotStatus> next_status(std::stop_token stop);
+
+  /// Until whoever sends the statuses reads our commands. Anybody else may read them too.
+  Result<void> wait_for_robot(std::stop_token stop);
+
+  WorldClientOptions options_;
+  wire::Inbox<jostle_msgs::msg::RobotStatus> status_;
+  wire::Writer<jostle_msgs::msg::VelocityCommand> command_;
+  const std::uint64_t epoch_;
+  std::uint64_t sequence_number_ = 0;
+  bool heard_ = false;
+  bool known_ = false;  // a status has named our epoch
+  double time_ = 0.0;
+  std::uint64_t rejected_ = 0;
+};
+
+/// Object states from `rt/objects/states`, never older than the robot's newest
+/// status: what is planned from belongs together. Bad measurements are counted,
+/// reported and skipped; only if nothing good follows are they an error.
+class ObjectsClient final : public perception::ObjectSource {
+ public:
+  ObjectsClient(const wire::Participant& participant, const RobotClient& robot, const WorldClientOptions& options = {});
+
+  Result<std::vector<perception::ObjectReading>> read() override;
+
+  std::uint64_t rejected() const { return rejected_; }
+
+ private:
+  const RobotClient& robot_;
+  WorldClientOptions options_;
+  wire::Inbox<jostle_msgs::msg::ObjectStates> states_;
+  std::vector<perception::ObjectReading> newest_;
+  double time_ = -1.0;  // s, stamp of newest_; before the first: none
+  std::uint64_t rejected_ = 0;
+};
+
+}  // namespace jostle::world

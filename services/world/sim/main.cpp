@@ -1,0 +1,63 @@
+// jostle sim: a simulated world that takes commands and publishes what it is
+// seen to do.
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+
+#include "services/common/process/domain_claim.hpp"
+#include "services/common/process/program.hpp"
+#include "services/world/link/simulated_world.hpp"
+
+int main(int argc, char** argv) {
+  using namespace jostle;
+  using namespace jostle::world;
+  CLI::App app("Simulates the world in which actions happen.", "jostle sim");
+  std::string scene_file, level = "none";
+  SimulatedWorldOptions options;
+  wire::ParticipantOptions participant_options{.name = "jostle_sim"};
+  common::ProcessOptions process;
+  app.add_option("scene", scene_file, "Scene file")->required();
+  app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")
+      ->capture_default_str();
+  app.add_option("--seed", options.seed, "Of the noise")->capture_default_str();
+  app.add_option("--rate", options.rate, "World seconds per second; 0: as fast as possible")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
+  app.add_flag("--free-running", options.free_running, "Go on between actions instead of standing still");
+  common::add_process_options(app, process);
+  if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
+  common::die_with_parent(process.parent);
+  participant_options.domain = process.domain;
+  const common::StopSignal signal;
+  common::set_up_logging("sim");
+
+  const auto fail = [](const Error& error, int code) {
+    spdlog::error("{}", error.message);
+    return code;
+  };
+  auto level_result = physics_pool::parse_uncertainty(level);
+  if (!level_result) return fail(level_result.error(), common::kExitUsage);
+  options.level = *level_result;
+  auto scene_result = physics_pool::load_scene(scene_file);
+  if (!scene_result) return fail(scene_result.error(), common::kExitUsage);
+  auto world_result = physics_pool::World::compile(*scene_result);
+  if (!world_result) return fail(world_result.error(), common::kExitUsage);
+  auto participant_result = wire::Participant::open(participant_options);
+  if (!participant_result) return fail(participant_result.error(), common::kExitUsage);
+  // Before it says a word.
+  const auto claim_result = common::DomainClaim::take("simulated world", participant_result->domain(),
+                                                      std::chrono::seconds(1), participant_result->space());
+  if (!claim_result) return fail(claim_result.error(), common::kExitBroken);
+
+  try {
+    SimulatedWorld world(*participant_result, *world_result, options);
+    spdlog::info("world '{}' of {} objects on domain {}, uncertainty {}", scene_result->name,
+                 scene_result->objects.size(), participant_result->domain(), level);
+    if (auto ok = world.run(signal.token()); !ok) return fail(ok.error(), common::kExitBroken);
+    return common::kExitOk;
+  } catch (const wire::SetupError& error) {
+    return fail({Code::kUnavailable, error.what()}, common::kExitBroken);
+  }
+}

@@ -1,0 +1,179 @@
+// Definitions of our messages as text, and what they decode.
+
+#include "services/bags/format/definitions.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/bags.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using bags::Decoder;
+using bags::definition_of;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// CDR by hand: values aligned to their size behind the four bytes.
+class Cdr {
+ public:
+  explicit Cdr(bool is_little = true) : is_little_(is_little) { bytes_ = {std::byte{0}, std::byte{is_little}, {}, {}}; }
+  template <class T>
+  Cdr& add(T value) {
+    while ((bytes_.size() - 4) % sizeof(T) != 0) bytes_.push_back({});
+    std::array<std::byte, sizeof(T)> raw;
+    std::memcpy(raw.data(), &value, sizeof(T));
+    if (!is_little_) std::reverse(raw.begin(), raw.end());
+    bytes_.insert(bytes_.end(), raw.begin(), raw.end());
+    return *this;
+  }
+  Cdr& text(const std::string& value) {
+    add(static_cast<std::uint32_t>(value.size() + 1));
+    for (const char c : value + '\0') add(c);
+    return *this;
+  }
+  const Bytes& bytes() const { return bytes_; }
+
+ private:
+  bool is_little_;
+  Bytes bytes_;
+};
+
+Decoder decoder(const std::string& type) { return taken(Decoder::create(type, definition_of(type).value())); }
+
+TEST(DefinitionOf, IsAMessageFileWithItsPartsBehindIt) {
+  EXPECT_EQ(definition_of("geometry_msgs/msg/PoseStamped"),
+            "std_msgs/Header header\n"
+            "geometry_msgs/Pose pose\n" +
+                std::string(80, '=') +
+                "\nMSG: std_msgs/Header\n"
+                "builtin_interfaces/Time stamp\n"
+                "string frame_id\n" +
+                std::string(80, '=') +
+                "\nMSG: builtin_interfaces/Time\n"
+                "int32 sec  # since the Unix epoch\n"
+                "uint32 nanosec  # [0, 10^9)\n" +
+                std::string(80, '=') +
+                "\nMSG: geometry_msgs/Pose\n"
+                "geometry_msgs/Point position\n"
+                "geometry_msgs/Quaternion orientation\n" +
+                std::string(80, '=') +
+                "\nMSG: geometry_msgs/Point\n"
+                "float64 x  # m\nfloat64 y\nfloat64 z\n" +
+                std::string(80, '=') +
+                "\nMSG: geometry_msgs/Quaternion\n"
+                "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n");
+}
+
+TEST(DefinitionOf, KeepsWhatCommentsSay) {
+  EXPECT_THAT(
+      *definition_of("jostle_msgs/msg/ObjectState"),
+      StartsWith("# Pose X_WB and velocity of body B.\nstring name\ngeometry_msgs/Pose pose  # world frame, m\n"));
+  EXPECT_THAT(*definition_of("jostle_msgs/msg/VelocityCommand"), HasSubstr("float64[<=64] velocities"));
+  EXPECT_THAT(*definition_of("sensor_msgs/msg/CameraInfo"), HasSubstr("float64[9] k\n"));
+}
+
+TEST(DefinitionOf, IsThereForEveryMessageOfIdlAndDecodable) {
+  const auto types = bags::known_types();
+  ASSERT_GT(types.size(), 50u);
+  for (const char* type :
+       {"jostle_msgs/msg/Plan", "jostle_msgs/msg/Task", "jostle_msgs/msg/GoalResult", "tf2_msgs/msg/TFMessage",
+        "sensor_msgs/msg/PointCloud2", "visualization_msgs/msg/MarkerArray", "nav_msgs/msg/Odometry",
+        "rcl_interfaces/msg/Log", "diagnostic_msgs/msg/DiagnosticArray", "trajectory_msgs/msg/JointTrajectory"}) {
+    EXPECT_THAT(types, Contains(type));
+  }
+  for (const std::string& type : types) EXPECT_TRUE(Decoder::create(type, *definition_of(type))) << type;
+  EXPECT_FALSE(definition_of("some_msgs/msg/Other"));
+}
+
+TEST(DefinitionsOfIdl, SayWhatIsMalformedAndWhere) {
+  const auto error = [](std::string_view text) { return bags::definitions_of_idl({{"a.idl", text}}).error().message; };
+  EXPECT_THAT(error("module a {\n module msg {\n struct S {\n double;\n};\n};\n};"),
+              HasSubstr("a.idl: line 4: got ';', wanted a name"));
+  EXPECT_THAT(error("struct S {};"), HasSubstr("line 1: got 'struct', wanted 'module'"));
+  EXPECT_THAT(error("module a { module msg { struct S { T t; }; }; };"), HasSubstr("t: got type a/T"));
+  EXPECT_THAT(error("module a { module msg { struct S { double x"), HasSubstr("wanted ';'"));
+}
+
+TEST(DecoderTest, DecodesEveryKindOfFieldInBothByteOrders) {
+  const auto sut = taken(Decoder::create("a/msg/B",
+                                         "uint8 KIND=3\nstring TEXT = \"# no comment\"\nbool flag\nint16 small\nuint64 "
+                                         "large\nfloat32 f\nint8[3] fixed\nstring[] names\n"
+                                         "Part[<=2] parts 7\nother/Time[1] time\n=====\nMSG: a/Part\nbyte b\nfloat64 d "
+                                         "# unit\n=====\nMSG: other/msg/Time\nint32 sec\n"));
+  for (const bool is_little : {true, false}) {
+    Cdr cdr(is_little);
+    cdr.add(std::uint8_t{1}).add(std::int16_t{-2}).add(~std::uint64_t{0}).add(0.5f);
+    cdr.add(std::int8_t{-1}).add(std::int8_t{0}).add(std::int8_t{1});
+    cdr.add(std::uint32_t{2}).text("x").text("");
+    cdr.add(std::uint32_t{1}).add(std::uint8_t{255}).add(-1e300);
+    cdr.add(std::int32_t{7});
+    EXPECT_EQ(taken(sut.decode(cdr.bytes())).dump(),
+              R"({"flag":true,"small":-2,"large":18446744073709551615,"f":0.5,"fixed":[-1,0,1],"names":["x",""],)"
+              R"("parts":[{"b":255,"d":-1e+300}],"time":[{"sec":7}]})");
+  }
+}
+
+TEST(DecoderTest, DecodesAStringAndAnEmptyMessage) {
+  EXPECT_EQ(taken(decoder("std_msgs/msg/String").decode(cdr_of("hello")))["data"], "hello");
+  EXPECT_EQ(taken(decoder("std_msgs/msg/Empty").decode(Bytes(5))).dump(), "{}");
+}
+
+TEST(DecoderTest, RefusesOtherBytesThanTheTypeHas) {
+  const auto sut = decoder("sensor_msgs/msg/JointState");
+  Cdr cdr;
+  cdr.add(std::int32_t{1})
+      .add(std::uint32_t{2})
+      .text("f")
+      .add(std::uint32_t{1})
+      .text("j")
+      .add(std::uint32_t{1})
+      .add(1.0);
+  cdr.add(std::uint32_t{0}).add(std::uint32_t{1}).add(2.0);
+  const Bytes& bytes = cdr.bytes();
+  ASSERT_TRUE(sut.decode(bytes));
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    EXPECT_FALSE(sut.decode(std::span(bytes).first(size))) << size;
+  }
+  Bytes longer = bytes;
+  longer.resize(longer.size() + 8);
+  EXPECT_THAT(sut.decode(longer).error().message, HasSubstr("8 bytes more"));
+  Bytes huge = bytes;
+  huge[4 + 16] = huge[4 + 17] = huge[4 + 18] = huge[4 + 19] = std::byte{0xFF};
+  EXPECT_THAT(sut.decode(huge).error().message, HasSubstr("name: byte "));
+  Bytes other = bytes;
+  other[1] = std::byte{7};
+  EXPECT_THAT(sut.decode(other).error().message, HasSubstr("encapsulation 0007"));
+}
+
+TEST(DecoderTest, NeverCrashesOnChangedBytes) {
+  const auto sut = decoder("jostle_msgs/msg/Task");
+  for (std::uint64_t seed = 0; seed < 2000; ++seed) {
+    Bytes bytes = noise(seed % 600 + 4, seed);
+    bytes[0] = std::byte{0};
+    bytes[1] = static_cast<std::byte>(seed % 2);
+    // Small numbers now and then, so that lengths are possible.
+    for (std::size_t i = 4; i < bytes.size(); i += 3) bytes[i] = std::byte{0};
+    (void)sut.decode(bytes);
+  }
+}
+
+TEST(DecoderTest, RefusesMalformedDefinitions) {
+  const auto error = [](const std::string& text) { return Decoder::create("a/msg/B", text).error().message; };
+  EXPECT_THAT(error("float64 x\nfloat64"), HasSubstr("a/msg/B: line 2: got 'float64', wanted a type and a name"));
+  EXPECT_THAT(error("float64[0] x"), HasSubstr("array size '0'"));
+  EXPECT_THAT(error("float64[x x"), HasSubstr("ends with ]"));
+  EXPECT_THAT(error("Other x"), HasSubstr("got type a/Other"));
+  EXPECT_THAT(error("B[] x"), HasSubstr("contains itself"));
+  EXPECT_THAT(error("wstring x"), HasSubstr("wstring"));
+  std::string deep = "T0 x\n";
+  for (int i = 0; i < 5000; ++i) deep += "===\nMSG: a/T" + std::to_string(i) + "\nT" + std::to_string(i + 1) + " x\n";
+  EXPECT_THAT(error(deep + "===\nMSG: a/T5000\nbool x\n"), HasSubstr("nested"));
+}
+
+}  // namespace
+}  // namespace jostle::tests

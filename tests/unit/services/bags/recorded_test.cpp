@@ -1,0 +1,205 @@
+// Runs and their motion out of bags: whole ones, and those that recorders leave that came
+// late or lost something.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "services/bags/format/bag_writer.hpp"
+#include "services/bags/recorded/recorded_motion.hpp"
+#include "services/bags/recorded/recorded_run.hpp"
+#include "services/wire/dds/cdr.hpp"
+#include "services/world/link/messages.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace jostle::bags {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr Time kSecond = 1'000'000'000;
+
+// A pusher and one object.
+StateLayout layout() {
+  return {.nq = 9, .nv = 8, .nu = 2, .joints = {"x", "y"}, .objects = {{.name = "can", .q = 2, .v = 2}}, .target = 0};
+}
+
+world::Seen seen_at(double x, double angle = 0.0) {
+  return {
+      .robot = {.q = {x, 0.0}, .v = {0.0, 0.0}},
+      .objects = {
+          {.name = "can", .position = {x + 1, 0, 0}, .orientation = {std::cos(angle / 2), 0, 0, std::sin(angle / 2)}}}};
+}
+
+class Recorded : public testing::Test {
+ protected:
+  Recorded() { writer = std::move(BagWriter::create(bag, {})).value(); }
+
+  template <class T>
+  void write(const std::string& topic, const std::string& type, Time time, const T& message) {
+    if (!topics.contains(topic)) topics[topic] = writer->add_topic({.name = topic, .type = type}).value();
+    const auto bytes = wire::to_cdr(message);
+    ASSERT_TRUE(writer->write(topics[topic], {.log_time = time, .publish_time = time, .data = bytes}));
+  }
+
+  void begin(const std::string& goal, Time time) {
+    jostle_msgs::msg::TaskRun run;
+    run.goal().goal_id(goal);
+    write("/task/run", "jostle_msgs/msg/TaskRun", time, run);
+  }
+
+  void observe(const std::string& goal, std::uint32_t number, Time time, double world, const world::Seen& seen) {
+    auto message = world::to_message(seen, world);
+    message.goal_id(goal);
+    message.number(number);
+    if (number > 0) message.duration(1.0);
+    write("/task/observation", "jostle_msgs/msg/Observation", time, message);
+  }
+
+  void plan(const std::string& goal, std::uint32_t number, std::uint32_t observation, Time time, double world = 0.0) {
+    jostle_msgs::msg::Plan message;
+    message.header(world::make_header(world));
+    message.goal_id(goal);
+    message.number(number);
+    message.observation(observation);
+    write("/robots/b/task/plan", "jostle_msgs/msg/Plan", time, message);  // any namespace will do
+  }
+
+  void state(Time time, double world, double x, double angle = 0.0) {
+    write("/objects/states", "jostle_msgs/msg/ObjectStates", time, world::to_message(seen_at(x, angle).objects, world));
+    jostle_msgs::msg::RobotStatus status;
+    status.header(world::make_header(world));
+    status.q({x, 0.0});
+    status.v({0.0, 0.0});
+    write("/robot/status", "jostle_msgs/msg/RobotStatus", time, status);
+  }
+
+  void end(const std::string& goal, const std::string& reason, Time time) {
+    jostle_msgs::msg::GoalResult result;
+    result.goal_id(goal);
+    result.reason(reason);
+    write("/task/result", "jostle_msgs/msg/GoalResult", time, result);
+  }
+
+  std::unique_ptr<BagReader> reader() {
+    EXPECT_TRUE(writer->close());
+    return std::move(BagReader::open(bag)).value();
+  }
+
+  tests::TempFolder folder;
+  const std::filesystem::path bag = std::filesystem::path(folder.path()) / "bag";
+  std::unique_ptr<BagWriter> writer;
+  std::map<std::string, int> topics;
+};
+
+TEST_F(Recorded, RunsComeInTheOrderTheyWereTakenUp) {
+  begin("second-name", kSecond), observe("second-name", 0, 2 * kSecond, 0, seen_at(0)),
+      plan("second-name", 0, 0, 3 * kSecond);
+  end("second-name", "target grasped", 4 * kSecond);
+  begin("a-name", 5 * kSecond), observe("a-name", 0, 6 * kSecond, 0, seen_at(0));
+
+  const auto runs_result = read_runs(*reader());
+
+  ASSERT_TRUE(runs_result) << runs_result.error().message;
+  ASSERT_EQ(runs_result->size(), 2u);
+  const RecordedRun &first = runs_result->front(), &second = runs_result->back();
+  EXPECT_EQ(first.run.goal().goal_id(), "second-name");
+  EXPECT_EQ(first.begin, kSecond);
+  EXPECT_EQ(first.end, 4 * kSecond);
+  EXPECT_EQ(first.plans.size(), 1u);
+  EXPECT_TRUE(first.concluded());
+  EXPECT_FALSE(second.result);
+  EXPECT_EQ(second.end, 6 * kSecond);
+  EXPECT_FALSE(second.concluded());
+  EXPECT_EQ(select_runs(*runs_result, "a-name")->size(), 1u);
+  EXPECT_THAT(select_runs(*runs_result, "b-name").error().message, HasSubstr("second-name, a-name"));
+}
+
+TEST_F(Recorded, WhatComesTwiceOrLateCountsOnce) {
+  begin("g", kSecond), begin("g", kSecond);
+  for (const std::uint32_t number : {1u, 0u, 1u, 2u}) observe("g", number, 2 * kSecond, number, seen_at(number));
+  plan("g", 0, 0, 3 * kSecond), plan("g", 0, 0, 3 * kSecond);
+
+  const auto runs_result = read_runs(*reader());
+
+  ASSERT_TRUE(runs_result) << runs_result.error().message;
+  ASSERT_EQ(runs_result->size(), 1u);
+  ASSERT_EQ(runs_result->front().observations.size(), 3u);
+  for (std::uint32_t i = 0; i < 3; ++i) EXPECT_EQ(runs_result->front().observations[i].number(), i);
+  EXPECT_EQ(runs_result->front().plans.size(), 1u);
+}
+
+TEST_F(Recorded, AMissingObservationOrPlanIsNamed) {
+  begin("g", kSecond);
+  observe("g", 0, kSecond, 0, seen_at(0)), observe("g", 2, kSecond, 2, seen_at(0));
+  EXPECT_THAT(read_runs(*reader()).error().message, HasSubstr("run g: observation 1 is missing"));
+}
+
+TEST_F(Recorded, APlanOfAnObservationThatIsMissingIsNamed) {
+  begin("g", kSecond), observe("g", 0, kSecond, 0, seen_at(0)), plan("g", 0, 1, kSecond);
+  EXPECT_THAT(read_runs(*reader()).error().message, HasSubstr("run g: observation 1 is missing"));
+}
+
+TEST_F(Recorded, ABagWithoutARunSaysWhatIsInIt) {
+  state(kSecond, 0, 0);
+  const auto runs_result = read_runs(*reader());
+  ASSERT_FALSE(runs_result);
+  EXPECT_EQ(runs_result.error().code, Code::kNotFound);
+  EXPECT_THAT(runs_result.error().message, HasSubstr("/objects/states, /robot/status"));
+}
+
+TEST_F(Recorded, BytesThatAreNoMessageAreNamed) {
+  writer->add_topic({.name = "/task/run", .type = "jostle_msgs/msg/TaskRun"}).value();
+  const std::array<std::byte, 6> bytes{};
+  ASSERT_TRUE(writer->write(0, {.log_time = kSecond, .data = bytes}));
+  EXPECT_THAT(read_runs(*reader()).error().message, HasSubstr("/task/run: 6 bytes"));
+}
+
+TEST_F(Recorded, MotionGoesStraightAndTurnsEvenlyBetweenSamples) {
+  begin("g", kSecond), observe("g", 0, kSecond, 5.0, seen_at(0)), plan("g", 0, 0, kSecond, 5.0);
+  state(kSecond, 5.0, 0.0), state(9 * kSecond, 5.0, 0.0);  // the world stands still while a plan is made
+  state(10 * kSecond, 7.0, 0.2, 1.0);
+  observe("g", 1, 10 * kSecond, 7.0, seen_at(0.2)), end("g", "target grasped", 10 * kSecond);
+  const auto source = reader();
+  const RecordedRun run = read_runs(*source)->front();
+
+  const auto world_result = RecordedMotion::read(*source, run, layout(), RunClock::kWorld);
+  const auto wall_result = RecordedMotion::read(*source, run, layout(), RunClock::kWall);
+
+  ASSERT_TRUE(world_result) << world_result.error().message;
+  EXPECT_DOUBLE_EQ(world_result->duration(), 2.0);
+  const auto half = world_result->at(1.0);
+  EXPECT_DOUBLE_EQ(half.state.q[0], 0.1);
+  EXPECT_NEAR(2 * std::atan2(half.state.q[8], half.state.q[5]), 0.5, 1e-12);
+  EXPECT_EQ(half.plan, 0);
+  EXPECT_EQ(world_result->at(2.0).action, 1);
+  EXPECT_EQ(world_result->at(-1.0).state, world_result->at(0.0).state);
+  EXPECT_EQ(world_result->at(99.0).state, world_result->at(2.0).state);
+  ASSERT_TRUE(wall_result);
+  EXPECT_DOUBLE_EQ(wall_result->duration(), 9.0);
+  EXPECT_DOUBLE_EQ(wall_result->at(8.0).state.q[0], 0.0);
+}
+
+TEST_F(Recorded, MotionOfABagWithoutStatesIsThatOfTheObservations) {
+  begin("g", kSecond), observe("g", 0, kSecond, 0.0, seen_at(0)), observe("g", 1, 2 * kSecond, 1.0, seen_at(0.4));
+  const auto source = reader();
+  const RecordedRun run = read_runs(*source)->front();
+
+  const auto motion_result = RecordedMotion::read(*source, run, layout(), RunClock::kWorld);
+
+  ASSERT_TRUE(motion_result) << motion_result.error().message;
+  EXPECT_DOUBLE_EQ(motion_result->at(0.5).state.q[0], 0.2);
+}
+
+TEST_F(Recorded, AStateThatDoesNotFitTheSceneIsNamed) {
+  begin("g", kSecond), observe("g", 0, kSecond, 0.0, seen_at(0)), state(kSecond, 0, 0);
+  const auto source = reader();
+  const RecordedRun run = read_runs(*source)->front();
+  StateLayout other = layout();
+  other.objects[0].name = "bottle";
+  EXPECT_THAT(RecordedMotion::read(*source, run, other, RunClock::kWorld).error().message,
+              HasSubstr("no measurement of 'bottle'"));
+}
+
+}  // namespace
+}  // namespace jostle::bags

@@ -1,0 +1,201 @@
+#include "services/task/config/parameters.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+namespace jostle::task {
+namespace {
+
+using testing::HasSubstr;
+
+Parameters parsed(const std::string& text) {
+  auto result = parse_parameters(text, "p.yaml");
+  if (!result) {
+    ADD_FAILURE() << result.error().message;
+    return {};
+  }
+  return std::move(result).value();
+}
+
+TEST(Parameters, KeepDefaultsOfWhatTheFileLeavesOut) {
+  const Parameters sut = parsed("planner: {rollouts: 17}\n"), wanted;
+  EXPECT_EQ(sut.planner.rollouts, 17);
+  EXPECT_EQ(sut.planner.sigma, wanted.planner.sigma);
+  EXPECT_EQ(sut.planner.limit, wanted.planner.limit);
+  EXPECT_EQ(sut.planner.update, wanted.planner.update);
+  EXPECT_EQ(sut.planner.lambda, wanted.planner.lambda);
+  EXPECT_EQ(sut.planner.min_steps, wanted.planner.min_steps);
+  EXPECT_EQ(sut.planner.step_duration, wanted.planner.step_duration);
+  EXPECT_EQ(sut.planner.stop_losers, wanted.planner.stop_losers);
+  EXPECT_EQ(sut.planner.objective.goal, wanted.planner.objective.goal);
+  EXPECT_EQ(sut.planner.objective.edge_exponent_max, wanted.planner.objective.edge_exponent_max);
+  EXPECT_EQ(sut.planner.objective.success_cost, wanted.planner.objective.success_cost);
+  EXPECT_EQ(sut.control.many_iterations, wanted.control.many_iterations);
+  EXPECT_EQ(sut.control.deviation_threshold, wanted.control.deviation_threshold);
+  EXPECT_EQ(sut.control.timeout, wanted.control.timeout);
+  EXPECT_EQ(sut.control.close_hand, wanted.control.close_hand);
+}
+
+TEST(Parameters, TakeEveryKey) {
+  const Parameters sut = parsed(R"(
+step_duration: 0.5
+min_steps: 4
+planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], scales: [0.5, 2], update: cost-weighted, lambda: 9, persistence: 0.9, stop_losers: false,
+          stop_hopeless: true, freeze: true, screening: 32, screening_time_step: 0.005}
+objective: {goal: 10, angle: 11, acceleration: 12, disturbance: 13, disturbance_rotation: 14, edge: 15, edge_rate: 16,
+            edge_exponent_max: 17, edge_margin: 18, topple: 19, topple_angle: 20, drop: 21, drop_height: 22, success_cost: 23, obstruction: 24,
+            obstacle_target: 25, obstacle_pusher: 26, obstacle_nearest: 27, intrusion: 28, collision: 29}
+control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, initial_steps: 27, straight_speed: 0.28,
+          few_iterations_max: 30, obstruction_patience: 31,
+          timeout: 29.5, close_hand: false}
+mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straight_speed: 0.36}
+)");
+  EXPECT_EQ(sut.planner.step_duration, 0.5);
+  EXPECT_EQ(sut.control.step_duration, 0.5);
+  EXPECT_EQ(sut.planner.min_steps, 4);
+  EXPECT_EQ(sut.control.min_steps, 4);
+  EXPECT_EQ(sut.planner.rollouts, 3);
+  EXPECT_THAT(sut.planner.sigma, testing::ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(sut.planner.limit, testing::ElementsAre(5, 6, 7, 8));
+  EXPECT_THAT(sut.planner.scales, testing::ElementsAre(0.5, 2));
+  EXPECT_EQ(sut.planner.update, planners::PbstoOptions::Update::kCostWeighted);
+  EXPECT_EQ(sut.planner.lambda, 9);
+  EXPECT_EQ(sut.planner.persistence, 0.9);
+  EXPECT_FALSE(sut.planner.stop_losers);
+  EXPECT_TRUE(sut.planner.stop_hopeless);
+  EXPECT_TRUE(sut.planner.freeze);
+  EXPECT_EQ(sut.planner.screening, 32);
+  EXPECT_EQ(sut.planner.screening_time_step, 0.005);
+  const auto& o = sut.planner.objective;
+  EXPECT_THAT((std::vector{o.goal,
+                           o.angle,
+                           o.acceleration,
+                           o.disturbance,
+                           o.disturbance_rotation,
+                           o.edge,
+                           o.edge_rate,
+                           o.edge_exponent_max,
+                           o.edge_margin,
+                           o.topple,
+                           o.topple_angle,
+                           o.drop,
+                           o.drop_height,
+                           o.success_cost,
+                           o.obstruction,
+                           o.obstacle_target,
+                           o.obstacle_pusher,
+                           o.obstacle_nearest,
+                           o.intrusion,
+                           o.collision}),
+              testing::ElementsAre(10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29));
+  EXPECT_EQ(sut.control.many_iterations, 24);
+  EXPECT_EQ(sut.control.few_iterations, 25);
+  EXPECT_EQ(sut.control.deviation_threshold, 26);
+  EXPECT_EQ(sut.control.initial_steps, 27);
+  EXPECT_EQ(sut.control.straight_speed, 0.28);
+  EXPECT_EQ(sut.control.few_iterations_max, 30);
+  EXPECT_EQ(sut.control.obstruction_patience, 31);
+  EXPECT_EQ(sut.control.timeout, std::chrono::milliseconds(29500));
+  EXPECT_FALSE(sut.control.close_hand);
+  EXPECT_EQ(sut.mpc.horizon, 32);
+  EXPECT_EQ(sut.mpc.first_iterations, 33);
+  EXPECT_EQ(sut.mpc.iterations, 34);
+  EXPECT_EQ(sut.mpc.max_actions, 35);
+  EXPECT_EQ(sut.mpc.straight_speed, 0.36);
+  EXPECT_EQ(sut.mpc.step_duration, 0.5);
+  EXPECT_EQ(sut.mpc.timeout, std::chrono::milliseconds(29500));
+}
+
+// experiments/pushing.yaml says what the code's defaults of pushing are.
+TEST(Parameters, OfPushingAreThoseOfTheCode) {
+  const auto result = load_parameters(std::filesystem::path(JOSTLE_SOURCE_DIR) / "experiments/pushing.yaml");
+  ASSERT_TRUE(result) << result.error().message;
+  const planners::PbstoOptions &got = result->planner, wanted = planners::push_planner_options();
+  EXPECT_EQ(got.rollouts, wanted.rollouts);
+  EXPECT_EQ(got.sigma, wanted.sigma);
+  EXPECT_EQ(got.limit, wanted.limit);
+  EXPECT_EQ(got.scales, wanted.scales);
+  EXPECT_EQ(got.persistence, wanted.persistence);
+  EXPECT_EQ(got.update, wanted.update);
+  EXPECT_EQ(got.min_steps, wanted.min_steps);
+  EXPECT_EQ(got.step_duration, wanted.step_duration);
+  EXPECT_EQ(std::memcmp(&got.objective, &wanted.objective, sizeof wanted.objective), 0);
+  const planners::MpcOptions &mpc = result->mpc, defaults;
+  EXPECT_EQ(mpc.horizon, defaults.horizon);
+  EXPECT_EQ(mpc.first_iterations, defaults.first_iterations);
+  EXPECT_EQ(mpc.iterations, defaults.iterations);
+  EXPECT_EQ(mpc.max_actions, defaults.max_actions);
+  EXPECT_EQ(mpc.straight_speed, defaults.straight_speed);
+  EXPECT_EQ(mpc.timeout, defaults.timeout);
+}
+
+struct Case {
+  const char *name, *text;
+  std::vector<const char*> told;
+};
+void PrintTo(const Case& value, std::ostream* out) { *out << value.name; }
+
+class BadParameters : public testing::TestWithParam<Case> {};
+
+TEST_P(BadParameters, AreRefusedWithFileLineFieldGotAndWanted) {
+  const auto result = parse_parameters(GetParam().text, "p.yaml");
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Code::kInvalidArgument);
+  for (const char* words : GetParam().told) EXPECT_THAT(result.error().message, HasSubstr(words));
+}
+
+const std::vector<Case> kCases{
+    {"NoScreening", "planner: {screening: 0}\n", {"planner.screening", "got 0", "1 to 10000"}},
+    {"LongScreeningStep", "planner: {screening_time_step: 0.1}\n", {"planner.screening_time_step", "got 0.1", "0.02"}},
+    {"OddScreeningStep",
+     "planner: {screening: 2, screening_time_step: 0.007}\n",
+     {"planner.screening_time_step", "0.007", "step_duration, 1 s"}},
+    {"TooMuchToScreen",
+     "planner: {screening: 10000, rollouts: 1000}\n",
+     {"planner.rollouts", "planner.screening", "1000000"}},
+    {"UnknownKey", "step_duration: 1\nsteps: 3\n", {"p.yaml:2", "steps", "unknown key", "min_steps"}},
+    {"UnknownPlannerKey", "planner:\n  rollout: 3\n", {"p.yaml:2", "planner.rollout", "unknown key", "rollouts"}},
+    {"UnknownObjectiveKey", "objective: {gaol: 3}\n", {"p.yaml:1", "objective.gaol", "unknown key", "goal"}},
+    {"UnknownControlKey", "control: {timeouts: 3}\n", {"p.yaml:1", "control.timeouts", "unknown key", "timeout"}},
+    {"UnknownUpdate", "planner: {update: best}\n", {"p.yaml:1", "planner.update", "'best'", "greedy, cost-weighted"}},
+    {"WrongType", "planner:\n  rollouts: many\n", {"p.yaml:2", "planner.rollouts", "'many'", "a whole number"}},
+    {"ThreeSigmas",
+     "planner: {sigma: [1, 2, 3]}\n",
+     {"p.yaml", "planner.sigma", "got 3 numbers", "4 for a gripper or 2 for a pusher"}},
+    {"LimitsOfAnotherRobot",
+     "planner: {sigma: [1, 2]}\n",
+     {"p.yaml", "planner.limit", "got 4 numbers", "of sigma and limit alike"}},
+    {"NoHorizon", "mpc: {horizon: 0}\n", {"p.yaml", "mpc.horizon", "got 0", "1 to"}},
+    {"NoActions", "mpc: {max_actions: 0}\n", {"p.yaml", "mpc.max_actions", "got 0", "1 to"}},
+    {"UnknownMpcKey", "mpc: {steps: 3}\n", {"p.yaml:1", "mpc.steps", "unknown key", "horizon"}},
+    {"NaNTimeout", "control: {timeout: .nan}\n", {"p.yaml", "control.timeout", "nan", "1 to"}},
+    {"NoSteps", "control: {initial_steps: 0}\n", {"p.yaml", "control.initial_steps", "got 0", "1 to"}},
+    {"NoRollouts", "planner: {rollouts: 0}\n", {"p.yaml", "planner.rollouts", "got 0", "1 to"}},
+    {"NotYaml", "planner: [\n", {"p.yaml:", "not YAML"}},
+    {"NotAMapping", "fast\n", {"p.yaml:1", "wanted a mapping"}},
+};
+
+INSTANTIATE_TEST_SUITE_P(EveryKind, BadParameters, testing::ValuesIn(kCases),
+                         [](const auto& param) { return std::string(param.param.name); });
+
+TEST(Parameters, NameTheFileThatCannotBeRead) {
+  const auto result = load_parameters("no/such/file.yaml");
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Code::kIo);
+  EXPECT_THAT(result.error().message, HasSubstr("no/such/file.yaml"));
+}
+
+TEST(Parameters, AreLoadedFromAFile) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "jostle_parameters_test.yaml";
+  std::ofstream(file) << "min_steps: 3\n";
+  const auto result = load_parameters(file);
+  std::filesystem::remove(file);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->planner.min_steps, 3);
+}
+
+}  // namespace
+}  // namespace jostle::task

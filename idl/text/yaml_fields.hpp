@@ -14,6 +14,7 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "idl/types/result.hpp"
 
@@ -105,6 +106,36 @@ class Fields {
       fields.finish();
     } else if (is_required) {
       fail(node_, name(key), "missing, wanted a mapping");
+    }
+  }
+
+  bool has(const char* key) const { return static_cast<bool>(node_[key]); }
+  bool is_mapping(const char* key) const { return node_[key] && node_[key].IsMap(); }
+
+  /// A mapping of names to numbers, in the file's order.
+  void pairs(const char* key, std::vector<std::pair<std::string, double>>& values) {
+    const YAML::Node node = take(key);
+    if (!node) return;
+    if (!node.IsMap()) fail(node, name(key), fmt::format("got {}, wanted a mapping of names to numbers", describe(node)));
+    for (const auto& entry : node) {
+      const auto word = entry.first.as<std::string>();
+      values.emplace_back(word, convert<double>(entry.second, name(key) + "." + word));
+    }
+  }
+
+  /// Says what is wrong with a field that has been read.
+  [[noreturn]] void refuse(const char* key, const std::string& problem) const {
+    const YAML::Node node = node_[key];
+    fail(node ? node : node_, name(key), problem);
+  }
+
+  /// The key in a list that may be missing.
+  template <class Reader>
+  void optional_list(const char* key, Reader read) {
+    if (node_[key]) {
+      list(key, read);
+    } else {
+      known_.insert(key);
     }
   }
 

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "idl/types/pose.hpp"
+
 namespace jostle {
 
 /// x = (q, v) in engine order. A free body takes 7 numbers of q (position in
@@ -29,8 +31,6 @@ struct ObjectSlot {
 };
 
 /// Names the parts of a State. The robot's joints come first; then the objects.
-/// A planar gripper has x, y [m], rotation [rad], left and right finger [m]; a
-/// pusher has x and y.
 struct StateLayout {
   int nq = 0;
   int nv = 0;
@@ -44,23 +44,54 @@ struct StateLayout {
   bool operator==(const StateLayout&) const = default;
 };
 
-/// Joint positions inside State::q of the planar gripper; a pusher has the first two.
-enum RobotJoint : int { kJointX, kJointY, kJointRotation, kJointLeft, kJointRight, kGripperJoints, kPusherJoints = 2 };
+/// One object's share of a State, which outlives it.
+class ObjectView {
+ public:
+  ObjectView(const ObjectSlot& slot, const State& x) : q_(&x.q[index(slot.q)]), v_(&x.v[index(slot.v)]) {}
 
-/// Entries of one control u: velocities of x, y [m/s], rotation [rad/s] and
-/// opening [m/s; the distance between the fingers grows]. Thesis, Sec. 3.1. A
-/// pusher has the first two (Sec. 6.1).
-enum ControlAxis : int { kControlX, kControlY, kControlRotation, kControlOpening, kGripperAxes, kPusherAxes = 2 };
+  const double* position() const { return q_; }              ///< [3] p_WoBo_W, m
+  const double* orientation() const { return q_ + 3; }       ///< [4] unit quaternion w, x, y, z
+  const double* linear_velocity() const { return v_; }       ///< [3] m/s, in the world
+  const double* angular_velocity() const { return v_ + 3; }  ///< [3] rad/s, in the body
+  double yaw() const { return yaw_of(orientation()); }       ///< rad
+  double uprightness() const { return jostle::uprightness(orientation()); }
+
+ private:
+  static std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+  const double* q_;
+  const double* v_;
+};
+
+/// The parts of a State by name. Both arguments outlive it.
+class StateView {
+ public:
+  StateView(const StateLayout& layout, const State& x) : layout_(layout), x_(x) {}
+
+  ObjectView object(std::size_t i) const { return {layout_.objects[i], x_}; }
+  ObjectView target() const { return object(static_cast<std::size_t>(layout_.target)); }
+  std::size_t objects() const { return layout_.objects.size(); }
+  bool is_target(std::size_t i) const { return static_cast<int>(i) == layout_.target; }
+  std::span<const double> joints() const { return {x_.q.data(), layout_.joints.size()}; }  ///< m, rad
+
+ private:
+  const StateLayout& layout_;
+  const State& x_;
+};
 
 /// U = u_0 … u_{n-1}, each held for the step duration of its user.
 struct ControlSequence {
-  int nu = kGripperAxes;
-  std::vector<double> values;  ///< [n][nu] row-major, m/s and rad/s
+  int nu = 0;                  ///< size of one control; 0 until the first is appended
+  std::vector<double> values;  ///< [n][nu] row-major, by axis of the robot, m/s and rad/s
 
   int steps() const { return nu > 0 ? static_cast<int>(values.size()) / nu : 0; }
   std::span<double> step(int t) { return {values.data() + index(t), size(nu)}; }
   std::span<const double> step(int t) const { return {values.data() + index(t), size(nu)}; }
-  void append(std::span<const double> u) { values.insert(values.end(), u.begin(), u.end()); }
+  /// One control, or several in a row once nu is known.
+  void append(std::span<const double> u) {
+    if (nu == 0) nu = static_cast<int>(u.size());
+    values.insert(values.end(), u.begin(), u.end());
+  }
   void truncate(int steps) { values.resize(index(steps)); }
   void drop_first() { values.erase(values.begin(), values.begin() + nu); }
 

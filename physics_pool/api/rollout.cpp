@@ -10,53 +10,15 @@
 namespace jostle::physics_pool {
 namespace {
 
-Error wrong(const std::string& field, const std::string& got, const std::string& wanted) {
-  return {Code::kInvalidArgument, fmt::format("{}: got {}, wanted {}", field, got, wanted)};
-}
-
 Result<void> check_size(const char* field, std::size_t got, std::size_t wanted) {
   if (got == wanted) return {};
-  return wrong(field, fmt::format("{} values", got), std::to_string(wanted));
+  return invalid(field, fmt::format("{} values", got), std::to_string(wanted));
 }
 
 Result<void> check_finite(const char* field, const std::vector<double>& values) {
   const auto bad = std::ranges::find_if_not(values, [](double value) { return std::isfinite(value); });
   if (bad == values.end()) return {};
-  return wrong(fmt::format("{}[{}]", field, bad - values.begin()), fmt::format("{}", *bad), "a finite number");
-}
-
-constexpr double kLeastNearest = 1e-3;  // m
-
-Result<void> check_weights(const Objective& o) {
-  const std::pair<const char*, double> weights[] = {{"goal", o.goal},
-                                                    {"angle", o.angle},
-                                                    {"acceleration", o.acceleration},
-                                                    {"disturbance", o.disturbance},
-                                                    {"disturbance_rotation", o.disturbance_rotation},
-                                                    {"edge", o.edge},
-                                                    {"edge_rate", o.edge_rate},
-                                                    {"edge_exponent_max", o.edge_exponent_max},
-                                                    {"edge_margin", o.edge_margin},
-                                                    {"topple", o.topple},
-                                                    {"topple_angle", o.topple_angle},
-                                                    {"drop", o.drop},
-                                                    {"drop_height", o.drop_height},
-                                                    {"obstruction", o.obstruction},
-                                                    {"obstacle_target", o.obstacle_target},
-                                                    {"obstacle_pusher", o.obstacle_pusher},
-                                                    {"collision", o.collision},
-                                                    {"intrusion", o.intrusion},
-                                                    {"success_cost", o.success_cost}};
-  for (const auto& [name, value] : weights) {
-    if (value >= 0 && std::isfinite(value)) continue;
-    return wrong(fmt::format("objective.{}", name), fmt::format("{}", value),
-                 "a finite number >= 0, or rollouts could not be stopped early");
-  }
-  if (!(o.obstacle_nearest >= kLeastNearest && std::isfinite(o.obstacle_nearest))) {
-    return wrong("objective.obstacle_nearest", fmt::format("{} m", o.obstacle_nearest),
-                 fmt::format("a finite number >= {} m, or costs could be infinite", kLeastNearest));
-  }
-  return {};
+  return invalid(fmt::format("{}[{}]", field, bad - values.begin()), fmt::format("{}", *bad), "a finite number");
 }
 
 }  // namespace
@@ -100,38 +62,38 @@ int select_winner(const std::vector<RolloutOutcome>& outcomes, double incumbent)
 
 Result<void> validate(const RolloutBatch& batch) {
   if (batch.nominal.nu < 1 || batch.nominal.nu > 64) {
-    return wrong("nominal.nu", std::to_string(batch.nominal.nu), "1 to 64");
+    return invalid("nominal.nu", std::to_string(batch.nominal.nu), "1 to 64");
   }
   const auto nu = static_cast<std::size_t>(batch.nominal.nu);
   if (batch.nominal.values.empty() || batch.nominal.values.size() % nu != 0) {
-    return wrong("nominal.values", fmt::format("{} values", batch.nominal.values.size()),
+    return invalid("nominal.values", fmt::format("{} values", batch.nominal.values.size()),
                  fmt::format("a multiple of nu = {}, at least one step", nu));
   }
   if (batch.nominal.steps() > kMaxSteps) {
-    return wrong("nominal.values", fmt::format("{} steps", batch.nominal.steps()),
+    return invalid("nominal.values", fmt::format("{} steps", batch.nominal.steps()),
                  fmt::format("at most {}", kMaxSteps));
   }
   if (batch.samples < 1 || batch.samples > kMaxSamples) {
-    return wrong("samples", std::to_string(batch.samples), fmt::format("1 to {}", kMaxSamples));
+    return invalid("samples", std::to_string(batch.samples), fmt::format("1 to {}", kMaxSamples));
   }
   if (batch.first_sample > UINT32_MAX - batch.samples) {
-    return wrong("first_sample", std::to_string(batch.first_sample), "no wrap-around");
+    return invalid("first_sample", std::to_string(batch.first_sample), "no wrap-around");
   }
   if (!(batch.step_duration > 0 && batch.step_duration <= kMaxStepDuration)) {
-    return wrong("step_duration", fmt::format("{} s", batch.step_duration),
+    return invalid("step_duration", fmt::format("{} s", batch.step_duration),
                  fmt::format("more than 0, at most {} s", kMaxStepDuration));
   }
   if (batch.x0.q.size() > kMaxStateSize || batch.x0.v.size() > kMaxStateSize) {
-    return wrong("x0", fmt::format("{} + {} values", batch.x0.q.size(), batch.x0.v.size()),
+    return invalid("x0", fmt::format("{} + {} values", batch.x0.q.size(), batch.x0.v.size()),
                  fmt::format("at most {} each", kMaxStateSize));
   }
-  if (std::isnan(batch.incumbent)) return wrong("incumbent", "NaN", "a cost or +inf");
-  if (batch.min_steps < 0) return wrong("min_steps", std::to_string(batch.min_steps), ">= 0");
+  if (std::isnan(batch.incumbent)) return invalid("incumbent", "NaN", "a cost or +inf");
+  if (batch.min_steps < 0) return invalid("min_steps", std::to_string(batch.min_steps), ">= 0");
   if (batch.wait && (*batch.wait < batch.wait->zero() || *batch.wait > kMaxWait)) {
-    return wrong("wait", fmt::format("{} ns", batch.wait->count()), "0 to 10 s");
+    return invalid("wait", fmt::format("{} ns", batch.wait->count()), "0 to 10 s");
   }
   if (batch.priority > Priority::kUrgent) {
-    return wrong("priority", std::to_string(static_cast<int>(batch.priority)), "0 (normal) or 1 (urgent)");
+    return invalid("priority", std::to_string(static_cast<int>(batch.priority)), "0 (normal) or 1 (urgent)");
   }
   if (auto ok = check_size("u_before", batch.u_before.size(), nu); !ok) return ok;
   if (batch.law.sigma.size() != batch.nominal.values.size()) {
@@ -140,39 +102,39 @@ Result<void> validate(const RolloutBatch& batch) {
   if (auto ok = check_size("law.limit", batch.law.limit.size(), nu); !ok) return ok;
   for (std::size_t i = 0; i < batch.law.sigma.size(); ++i) {
     if (!(batch.law.sigma[i] >= 0 && std::isfinite(batch.law.sigma[i]))) {
-      return wrong(fmt::format("law.sigma[{}]", i), fmt::format("{}", batch.law.sigma[i]), "a finite number >= 0");
+      return invalid(fmt::format("law.sigma[{}]", i), fmt::format("{}", batch.law.sigma[i]), "a finite number >= 0");
     }
   }
   for (std::size_t i = 0; i < nu; ++i) {
     if (!(batch.law.limit[i] > 0)) {
-      return wrong(fmt::format("law.limit[{}]", i), fmt::format("{}", batch.law.limit[i]), "> 0");
+      return invalid(fmt::format("law.limit[{}]", i), fmt::format("{}", batch.law.limit[i]), "> 0");
     }
   }
   if (!(batch.law.persistence >= 0 && batch.law.persistence < 1)) {
-    return wrong("law.persistence", fmt::format("{}", batch.law.persistence), "at least 0, less than 1");
+    return invalid("law.persistence", fmt::format("{}", batch.law.persistence), "at least 0, less than 1");
   }
   const std::size_t last = std::size_t{batch.first_sample} + batch.samples;
   if (!batch.law.draws.empty() && batch.law.draws.size() < last) {
-    return wrong("law.draws", fmt::format("{} values", batch.law.draws.size()),
+    return invalid("law.draws", fmt::format("{} values", batch.law.draws.size()),
                  fmt::format("none, or one for each of {} samples", last));
   }
   if (!(batch.fidelity.time_step >= 0 && batch.fidelity.time_step <= kMaxTimeStep)) {
-    return wrong("fidelity.time_step", fmt::format("{} s", batch.fidelity.time_step),
+    return invalid("fidelity.time_step", fmt::format("{} s", batch.fidelity.time_step),
                  fmt::format("0 for the world's own, at most {} s", kMaxTimeStep));
   }
   if (batch.law.scales.empty() || batch.law.scales.size() > kMaxScales) {
-    return wrong("law.scales", fmt::format("{} values", batch.law.scales.size()), fmt::format("1 to {}", kMaxScales));
+    return invalid("law.scales", fmt::format("{} values", batch.law.scales.size()), fmt::format("1 to {}", kMaxScales));
   }
   for (std::size_t i = 0; i < batch.law.scales.size(); ++i) {
     const double scale = batch.law.scales[i];
     if (scale >= 0 && std::isfinite(scale)) continue;
-    return wrong(fmt::format("law.scales[{}]", i), fmt::format("{}", scale), "a finite number >= 0");
+    return invalid(fmt::format("law.scales[{}]", i), fmt::format("{}", scale), "a finite number >= 0");
   }
   if (auto ok = check_finite("x0.q", batch.x0.q); !ok) return ok;
   if (auto ok = check_finite("x0.v", batch.x0.v); !ok) return ok;
   if (auto ok = check_finite("u_before", batch.u_before); !ok) return ok;
   if (auto ok = check_finite("nominal.values", batch.nominal.values); !ok) return ok;
-  return check_weights(batch.objective);
+  return validate(batch.objective);
 }
 
 Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, double time_step) {
@@ -180,12 +142,12 @@ Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, doub
   if (auto ok = check_size("x0.q", batch.x0.q.size(), layout.nq); !ok) return ok;
   if (auto ok = check_size("x0.v", batch.x0.v.size(), layout.nv); !ok) return ok;
   if (batch.nominal.nu != layout.nu) {
-    return wrong("nominal.nu", std::to_string(batch.nominal.nu), std::to_string(layout.nu));
+    return invalid("nominal.nu", std::to_string(batch.nominal.nu), std::to_string(layout.nu));
   }
   time_step = std::max(time_step, batch.fidelity.time_step);
   const double steps = batch.step_duration / time_step;
   if (steps < 0.5 || std::abs(steps - std::round(steps)) > 1e-6 * steps) {
-    return wrong("step_duration", fmt::format("{} s", batch.step_duration),
+    return invalid("step_duration", fmt::format("{} s", batch.step_duration),
                  fmt::format("a multiple of the time step, {} s", time_step));
   }
   return {};

@@ -13,7 +13,8 @@
 #include "idl/types/hash.hpp"
 #include "idl/types/result.hpp"
 #include "idl/types/state.hpp"
-#include "physics_pool/api/objective.hpp"
+#include "physics_pool/objective/objective.hpp"
+#include "physics_pool/objective/step_facts.hpp"
 
 namespace jostle::physics_pool {
 
@@ -78,7 +79,7 @@ struct RolloutBatch {
   SamplingLaw law;
   std::uint32_t first_sample = 0;
   std::uint32_t samples = 1;  ///< K >= 1
-  Objective objective;
+  Objective objective = Objective::standard();
   /// Cost to beat: a rollout that can no longer get below it, nor succeed, stops.
   double incumbent = kInfinity;
   bool stop_losers = true;  ///< off: every rollout runs to its end
@@ -111,6 +112,7 @@ struct RolloutOutcome {
   std::uint32_t thawed = 0;        ///< times a frozen object was touched and set free
   bool at_goal = false;            ///< the task's goal is reached at the last state
   std::vector<double> step_costs;  ///< [steps]; the last one carries the goal cost
+  std::vector<StepFacts> facts;    ///< [steps] what happened in each
   Trajectory trajectory;           ///< [steps + 1], or empty if not asked for
   std::string reason;              ///< why it diverged
 };

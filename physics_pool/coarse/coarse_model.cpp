@@ -12,10 +12,11 @@
 namespace jostle::physics_pool {
 
 Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, const Scene& scene) {
-  if (!scene.robot.is_pusher()) {
+  if (!disc_radius(scene.robot.model)) {
     return Error{Code::kInvalidArgument,
-                 fmt::format("scene '{}': robot.model: got '{}', wanted pusher: coarse models know no other robot",
-                             scene.name, scene.robot.model)};
+                 fmt::format("scene '{}': robot.model: got '{}', wanted a disc that moves in the plane, as the pusher is: "
+                             "coarse models know no other robot",
+                             scene.name, scene.robot.model.name)};
   }
   constexpr std::string_view kLearned = "learned:";
   if (name.starts_with(kLearned)) return load_learned_model(name.substr(kLearned.size()), scene);
@@ -32,21 +33,19 @@ Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, 
 
 void to_planar(const StateLayout& layout, const State& x, std::span<double> planar) {
   const PlanarLayout at{static_cast<int>(layout.objects.size())};
+  const StateView view(layout, x);
   std::copy_n(x.q.begin(), 2, planar.begin());
   std::copy_n(x.v.begin(), 2, planar.begin() + at.pusher_velocity());
   for (int i = 0; i < at.sliders; ++i) {
-    const ObjectSlot& slot = layout.objects[static_cast<std::size_t>(i)];
-    const double* q = &x.q[static_cast<std::size_t>(slot.q)];
-    const double* v = &x.v[static_cast<std::size_t>(slot.v)];
-    const double w = q[3], a = q[4], b = q[5], c = q[6];
+    const ObjectView object = view.object(static_cast<std::size_t>(i));
     double* pose = &planar[static_cast<std::size_t>(at.pose(i))];
-    pose[0] = q[0];
-    pose[1] = q[1];
-    pose[2] = std::atan2(2 * (w * c + a * b), 1 - 2 * (b * b + c * c));
+    pose[0] = object.position()[0];
+    pose[1] = object.position()[1];
+    pose[2] = object.yaw();
     double* velocity = &planar[static_cast<std::size_t>(at.velocity(i))];
-    velocity[0] = v[0];
-    velocity[1] = v[1];
-    velocity[2] = v[5];  // about the body's z axis, which is upright
+    velocity[0] = object.linear_velocity()[0];
+    velocity[1] = object.linear_velocity()[1];
+    velocity[2] = object.angular_velocity()[2];  // about the body's z axis, which is upright
   }
 }
 

@@ -18,7 +18,7 @@ struct Touch {
 
 KinematicModel::KinematicModel(const Scene& scene, double rotation_gain)
     : layout_{static_cast<int>(scene.objects.size())},
-      pusher_radius_(scene.robot.radius),
+      pusher_radius_(disc_radius(scene.robot.model).value()),
       rotation_gain_(rotation_gain) {
   for (const SceneObject& object : scene.objects) outlines_.push_back(outline(object));
 }

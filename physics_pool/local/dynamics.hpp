@@ -17,6 +17,7 @@ struct Advance {
   std::uint64_t engine_steps = 0;
   std::uint32_t thawed = 0;  ///< frozen objects that were touched and set free
   bool interrupted = false;
+  StepFacts facts;  ///< over all its engine steps
   std::string diverged;  ///< empty, or why the state is of no use
 };
 

@@ -24,7 +24,13 @@ bool is_out_of_reach(const mjModel* model, const mjData* data, int plane, int ge
   const mjtNum* centre = data->xpos + 3 * model->geom_bodyid[geom];
   if (mark(model, plane) == kFloorMark) return centre[2] > kDropped;
   const mjtNum* half = model->geom_size + 3 * plane;
-  return std::abs(centre[0]) > half[0] || std::abs(centre[1]) > half[1];
+  const mjtNum* middle = model->geom_pos + 3 * plane;
+  return std::abs(centre[0] - middle[0]) > half[0] || std::abs(centre[1] - middle[1]) > half[1];
+}
+
+bool is_plane(const mjModel* model, int geom) {
+  const double value = mark(model, geom);
+  return value == kSurfaceMark || value == kFloorMark;
 }
 
 // Returns nonzero to discard a pair. Replaces the engine's own mask test.
@@ -32,8 +38,8 @@ int filter_contact(const mjModel* model, mjData* data, int a, int b) {
   const bool paired = (model->geom_contype[a] & model->geom_conaffinity[b]) != 0 ||
                       (model->geom_contype[b] & model->geom_conaffinity[a]) != 0;
   if (!paired) return 1;
-  if (mark(model, a) != 0.0) return is_out_of_reach(model, data, a, b) ? 1 : 0;
-  if (mark(model, b) != 0.0) return is_out_of_reach(model, data, b, a) ? 1 : 0;
+  if (is_plane(model, a)) return is_out_of_reach(model, data, a, b) ? 1 : 0;
+  if (is_plane(model, b)) return is_out_of_reach(model, data, b, a) ? 1 : 0;
   return 0;
 }
 
@@ -48,12 +54,28 @@ void install_engine_handlers() {
   });
 }
 
-void set_controls(mjData& data, std::span<const double> u) {
-  data.ctrl[0] = u[kControlX];
-  data.ctrl[1] = u[kControlY];
-  if (u.size() == kPusherAxes) return;
-  data.ctrl[2] = u[kControlRotation];
-  data.ctrl[3] = data.ctrl[4] = u[kControlOpening] / 2;
+void set_controls(const RobotModel& robot, mjData& data, std::span<const double> u) {
+  // Actuators are those joints that are driven, in their order.
+  int actuator_of[kMaxRobotJoints], actuators = 0;
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    if (robot.joints[j].gain > 0) data.ctrl[actuator_of[j] = actuators++] = 0.0;
+  }
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    for (const auto& [joint, factor] : robot.axes[i].joints) data.ctrl[actuator_of[joint]] += factor * u[i];
+  }
+}
+
+void note_contacts(const mjModel& model, const mjData& data, const Scene& scene, StepFacts& facts) {
+  if (scene.fixtures.empty() || facts.robot_hit_fixture) return;
+  for (int i = 0; i < data.ncon; ++i) {
+    const double a = mark(&model, data.contact[i].geom1), b = mark(&model, data.contact[i].geom2);
+    if ((a == kFixtureMark && b == kRobotMark) || (a == kRobotMark && b == kFixtureMark)) facts.robot_hit_fixture = true;
+  }
+}
+
+void finish_step(const mjModel& model, mjData& data, const RobotModel& robot) {
+  if (robot.carries_itself) std::copy_n(data.qfrc_bias, robot.joints.size(), data.qfrc_applied);
+  mj_step2(&model, &data);
 }
 
 void forget(const mjModel& model, mjData& data) {

@@ -10,6 +10,8 @@
 #include <string>
 
 #include "physics_pool/local/handles.hpp"
+#include "physics_pool/objective/step.hpp"
+#include "physics_pool/scene/scene.hpp"
 
 namespace jostle::physics_pool {
 
@@ -24,9 +26,14 @@ class EngineError : public std::runtime_error {
 /// Installs the error, warning and contact handlers; safe to call repeatedly.
 void install_engine_handlers();
 
-/// Sets the drives to u [nu], m/s and rad/s; of a gripper's opening each finger takes
-/// half.
-void set_controls(mjData& data, std::span<const double> u);
+/// Sets the drives to u [nu], m/s and rad/s.
+void set_controls(const RobotModel& robot, mjData& data, std::span<const double> u);
+
+/// Adds what the contacts of the step that is being prepared (after mj_step1) say.
+void note_contacts(const mjModel& model, const mjData& data, const Scene& scene, StepFacts& facts);
+
+/// The second half of a step, mj_step2; a robot that carries itself gets the forces that balance its weight.
+void finish_step(const mjModel& model, mjData& data, const RobotModel& robot);
 
 /// Leaves nothing of what ran before: warm start, warnings, time.
 void forget(const mjModel& model, mjData& data);
@@ -39,7 +46,12 @@ std::string divergence(const mjModel& model, const mjData& data);
 /// centre is above it. MuJoCo's planes are infinite, yet they give steadier
 /// contacts than boxes (four points under a cylinder instead of one).
 inline constexpr double kSurfaceMark = 1.0;
-/// Of the floor far below, where what has dropped ends: it meets nothing else.
+/// The floor far below, where what has dropped ends: it meets nothing else.
 inline constexpr double kFloorMark = 2.0;
+/// What contacts are told apart by.
+inline constexpr double kFixtureMark = 3.0;
+inline constexpr double kRobotMark = 4.0;
+
+inline constexpr int kMaxRobotJoints = 64;
 
 }  // namespace jostle::physics_pool

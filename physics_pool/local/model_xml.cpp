@@ -1,45 +1,42 @@
 #include "physics_pool/local/model_xml.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
 
+#include "idl/types/transform.hpp"
 #include "physics_pool/local/engine.hpp"
-#include "physics_pool/scene/planar_gripper.hpp"
 
 namespace jostle::physics_pool {
 namespace {
-
-namespace hand = planar_gripper;
 
 // Collision masks: a pair meets if one's contype shares a bit with the other's
 // conaffinity. Objects meet everything; the robot meets walls and objects; frozen
 // objects meet the robot and free objects, but neither support nor each other.
 constexpr int kSupport = 1, kMovable = 2, kRobot = 4, kWall = 8;
 
-// The robot is velocity controlled: force = kv·(u - v). The engine treats it
-// explicitly, so kv·h must stay well below the inertia behind it: with h = 2 ms
-// and a time constant of inertia/kv = 10 ms the ratio is 0.2.
-struct Drive {
-  double inertia;  // kg or kg m^2, armature of the joint
-  double gain;     // N s/m or N m s/rad
-  double limit;    // N or N m
-};
-constexpr Drive kBaseDrive{20.0, 2000.0, 200.0};  // arm and base behind the hand
-constexpr Drive kWristDrive{0.5, 50.0, 28.0};     // limit: UR5 wrist
-constexpr Drive kFingerDrive{1.0, 100.0, 100.0};  // limit: middle of 20-235 N
-
-// What holds the pusher is heavy and stiff against what it pushes: a slider's
-// friction of 3 N slows it by 0.15 mm/s, and it is up to speed in 4 ms.
-constexpr Drive kPusherDrive{80.0, 20000.0, 20000.0};
-
-constexpr double kPusherClearance = 0.001;  // m above the surface
-
-constexpr double kWallThickness = 0.02;
 constexpr double kFloor = -0.75;  // m, where dropped objects end
+
+// Names of users, inside XML's double quotes.
+std::string quoted(const std::string& text) {
+  std::string safe;
+  for (const char c : text) {
+    if (c == '&') {
+      safe += "&amp;";
+    } else if (c == '<') {
+      safe += "&lt;";
+    } else if (c == '"') {
+      safe += "&quot;";
+    } else {
+      safe += c;
+    }
+  }
+  return safe;
+}
 
 class Writer {
  public:
@@ -54,8 +51,10 @@ class Writer {
   std::string text_;
 };
 
-// Light, colours and sky: pictures only, no influence on motion.
-void write_looks(Writer& xml, bool sky) {
+void write_meshes(Writer& xml, const RobotModel& robot);
+
+// Light, colours, sky and the robot's meshes.
+void write_looks(Writer& xml, const Scene& scene, bool sky) {
   xml.line(R"(<statistic center="0 0 0" extent="1"/>)");
   xml.line(
       R"(<visual><global offwidth="1280" offheight="960"/><quality shadowsize="4096"/><map znear="0.02" zfar="20" shadowclip="1.2"/><headlight ambient="0.42 0.42 0.43" diffuse="0.22 0.22 0.22" specular="0.05 0.05 0.05"/></visual>)");
@@ -68,6 +67,7 @@ void write_looks(Writer& xml, bool sky) {
   xml.line(R"(<material name="steel" rgba="0.58 0.60 0.63 1" specular="0.4"/>)");
   xml.line(R"(<material name="dark" rgba="0.40 0.41 0.44 1" specular="0.3"/>)");
   xml.line(R"(<material name="arm" rgba="0.68 0.71 0.74 1" specular="0.3"/>)");
+  write_meshes(xml, scene.robot.model);
   xml.line("</asset>");
 }
 
@@ -81,81 +81,130 @@ void write_camera(Writer& xml, const char* name, const std::array<double, 3>& ey
 }
 
 // Cameras and light that fit the surface, and a hand in front of it.
-void write_view(Writer& xml, const Surface& surface, bool hand_in_front) {
-  // The cameras were placed for the table of Sec. 3.3.1; a shelf's walls need more room.
-  const double walls = surface.kind == Surface::Kind::kShelf ? 0.06 : 0.0;
-  const double scale = (std::max(surface.size[0], surface.size[1]) + walls) / 0.6;
+void write_view(Writer& xml, const Scene& scene) {
+  // The cameras were placed for the table of Sec. 3.3.1; what stands around it needs more room.
+  const Rectangle bounds = scene.surface.bounds();
+  const double walls = scene.fixtures.empty() ? 0.0 : 0.06;
+  const double scale = (std::max(bounds.size[0], bounds.size[1]) + walls) / 0.6;
   xml.line(
       R"(<light pos="-0.9 -0.1 2.0" dir="0.48 0.16 -1" directional="true" diffuse="0.55 0.55 0.54" specular="0.25 0.25 0.25"/>)");
-  if (!hand_in_front) {
-    // A surface of 1.0 m x 0.8 m fills the picture.
-    const double size = std::max(surface.size[0], surface.size[1] / 0.8) + walls;
-    write_camera(xml, "overview", {-0.1 * size, -0.82 * size, 1.16 * size}, {0.01 * size, -0.05 * size, 0.0}, 36);
-    write_camera(xml, "top", {0.0, -0.01 * size, 1.3 * size}, {0.0, 0.0, 0.0}, 40);
+  const auto camera = [&](const char* name, std::array<double, 3> eye, std::array<double, 3> at, double fovy_deg) {
+    eye[0] += bounds.x, eye[1] += bounds.y, at[0] += bounds.x, at[1] += bounds.y;
+    write_camera(xml, name, eye, at, fovy_deg);
+  };
+  if (!as_planar(scene.robot.model)) {
+    // An arm stands beside the surface and reaches over it.
+    camera("overview", {-0.55 * scale, -1.3 * scale, 1.15 * scale}, {-0.05 * scale, 0.0, 0.2 * scale}, 42);
+    camera("top", {0.0, -0.01 * scale, 2.2 * scale}, {0.0, 0.0, 0.0}, 40);
     return;
   }
-  write_camera(xml, "overview", {-0.15 * scale, -0.66 * scale, 1.00 * scale}, {-0.07 * scale, -0.025 * scale, 0.0}, 36);
-  write_camera(xml, "top", {-0.1 * scale, -0.01 * scale, 1.2 * scale}, {-0.1 * scale, 0.0, 0.0}, 40);
+  if (!scene.robot.model.hand) {
+    // A surface of 1.0 m x 0.8 m fills the picture.
+    const double size = std::max(bounds.size[0], bounds.size[1] / 0.8) + walls;
+    camera("overview", {-0.1 * size, -0.82 * size, 1.16 * size}, {0.01 * size, -0.05 * size, 0.0}, 36);
+    camera("top", {0.0, -0.01 * size, 1.3 * size}, {0.0, 0.0, 0.0}, 40);
+    return;
+  }
+  camera("overview", {-0.15 * scale, -0.66 * scale, 1.00 * scale}, {-0.07 * scale, -0.025 * scale, 0.0}, 36);
+  camera("top", {-0.1 * scale, -0.01 * scale, 1.2 * scale}, {-0.1 * scale, 0.0, 0.0}, 40);
 }
 
 void write_surface(Writer& xml, const Surface& surface) {
-  const double half_x = surface.size[0] / 2, half_y = surface.size[1] / 2;
   xml.line(
       R"(<geom name="floor" type="plane" pos="0 0 {}" size="3 3 1" material="floor" contype="{}" conaffinity="0" user="{}"/>)",
       kFloor, kSupport, kFloorMark);
-  xml.line(
-      R"(<geom name="surface" type="plane" size="{} {} 1" rgba="0 0 0 0" contype="{}" conaffinity="0" user="{}"/>)",
-      half_x, half_y, kSupport, kSurfaceMark);
-  // What one sees of the table; the plane above is what things stand on.
-  xml.line(
-      R"(<geom name="table" type="box" pos="0 0 -0.02" size="{} {} 0.0199" material="wood" contype="0" conaffinity="0"/>)",
-      half_x, half_y);
-  if (surface.kind == Surface::Kind::kTable) return;
-  const double half_wall = kWallThickness / 2, half_height = surface.wall_height / 2;
-  const auto wall = [&](const char* name, double x, double y, double size_x, double size_y) {
+  for (std::size_t i = 0; i < surface.parts.size(); ++i) {
+    const Rectangle& part = surface.parts[i];
+    const double half_x = part.size[0] / 2, half_y = part.size[1] / 2;
     xml.line(
-        R"(<geom name="{}" type="box" pos="{} {} {}" size="{} {} {}" rgba="0.6 0.5 0.4 0.5" contype="{}" conaffinity="0"/>)",
-        name, x, y, half_height, size_x, size_y, half_height, kSupport | kWall);
-  };
-  wall("wall_back", half_x + half_wall, 0, half_wall, half_y + kWallThickness);
-  wall("wall_left", 0, half_y + half_wall, half_x, half_wall);
-  wall("wall_right", 0, -half_y - half_wall, half_x, half_wall);
+        R"(<geom name="surface{}" type="plane" pos="{} {} 0" size="{} {} 1" rgba="0 0 0 0" contype="{}" conaffinity="0" user="{}"/>)",
+        i, part.x, part.y, half_x, half_y, kSupport, kSurfaceMark);
+    // What one sees of the table; the plane above is what things stand on.
+    xml.line(
+        R"(<geom name="table{}" type="box" pos="{} {} -0.02" size="{} {} 0.0199" material="wood" contype="0" conaffinity="0"/>)",
+        i, part.x, part.y, half_x, half_y);
+  }
 }
 
-void write_pusher(Writer& xml, const SceneRobot& robot) {
-  xml.line(R"(<body name="pusher" pos="0 0 {}">)", kPusherClearance + robot.height / 2);
-  xml.line(R"(<joint name="pusher_x" type="slide" axis="1 0 0" armature="{}"/>)", kPusherDrive.inertia);
-  xml.line(R"(<joint name="pusher_y" type="slide" axis="0 1 0" armature="{}"/>)", kPusherDrive.inertia);
-  xml.line(
-      R"(<geom name="pusher" type="cylinder" size="{} {}" mass="1" material="steel" contype="{}" conaffinity="{}"/>)",
-      robot.radius, robot.height / 2, kRobot, kWall);
+std::string pose_text(const Pose& pose) {
+  return fmt::format(R"(pos="{}" quat="{}")", fmt::join(pose.position, " "), fmt::join(pose.orientation, " "));
+}
+
+void write_fixture(Writer& xml, const Fixture& fixture) {
+  const std::string size =
+      fixture.shape == Shape::kBox
+          ? fmt::format(R"(type="box" size="{} {} {}")", fixture.size[0] / 2, fixture.size[1] / 2, fixture.size[2] / 2)
+          : fmt::format(R"(type="cylinder" size="{} {}")", fixture.radius, fixture.height / 2);
+  xml.line(R"(<geom name="{}" {} {} rgba="0.6 0.5 0.4 0.5" contype="{}" conaffinity="0" user="{}"/>)",
+           quoted(fixture.name), size, pose_text(fixture.pose), kSupport | kWall, kFixtureMark);
+}
+
+// Meshes by number, in the order in which write_robot meets them.
+void write_meshes(Writer& xml, const RobotModel& robot) {
+  int number = 0;
+  for (const Link& link : robot.links) {
+    for (const RobotGeom& geom : link.geoms) {
+      if (geom.shape != GeomShape::kMesh) continue;
+      xml.line(R"(<mesh name="mesh{}" vertex="{}"/>)", number++, fmt::join(geom.vertices, " "));
+    }
+  }
+}
+
+void write_joint(Writer& xml, const Joint& joint) {
+  xml.line(R"(<joint name="{}" type="{}" axis="{}"{} armature="{}"/>)", quoted(joint.name),
+           joint.kind == JointKind::kSlide ? "slide" : "hinge", fmt::join(joint.axis, " "),
+           joint.is_limited() ? fmt::format(R"( range="{} {}" limited="true")", joint.low, joint.high) : "", joint.armature);
+}
+
+void write_geom(Writer& xml, const RobotGeom& geom, bool has_mass, int& mesh) {
+  std::string shape;
+  switch (geom.shape) {
+    case GeomShape::kBox:
+      shape = fmt::format(R"(type="box" size="{} {} {}")", geom.size[0] / 2, geom.size[1] / 2, geom.size[2] / 2);
+      break;
+    case GeomShape::kCylinder:
+      shape = fmt::format(R"(type="cylinder" size="{} {}")", geom.radius, geom.height / 2);
+      break;
+    case GeomShape::kSphere:
+      shape = fmt::format(R"(type="sphere" size="{}")", geom.radius);
+      break;
+    case GeomShape::kMesh:
+      shape = fmt::format(R"(type="mesh" mesh="mesh{}")", mesh++);
+      break;
+  }
+  xml.line(R"(<geom{} {} {}{} material="{}" contype="{}" conaffinity="{}" user="{}"/>)",
+           geom.name.empty() ? "" : fmt::format(R"( name="{}")", quoted(geom.name)), shape, pose_text(geom.pose),
+           has_mass ? fmt::format(R"( mass="{}")", geom.mass) : "", geom.material, kRobot, kWall, kRobotMark);
+}
+
+void write_link(Writer& xml, const RobotModel& robot, int index, const Pose& place, int& mesh) {
+  const Link& link = robot.links[static_cast<std::size_t>(index)];
+  xml.line(R"(<body name="{}" {}>)", quoted(link.name), pose_text(place));
+  for (const int joint : link.joints) write_joint(xml, robot.joints[static_cast<std::size_t>(joint)]);
+  if (link.inertia) {
+    xml.line(R"(<inertial {} mass="{}" fullinertia="{}"/>)", pose_text(link.inertia->pose), link.inertia->mass,
+             fmt::join(link.inertia->moments, " "));
+  }
+  for (const RobotGeom& geom : link.geoms) write_geom(xml, geom, !link.inertia, mesh);
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    const Link& child = robot.links[i];
+    if (child.parent == index) write_link(xml, robot, static_cast<int>(i), child.pose, mesh);
+  }
   xml.line("</body>");
 }
 
-void write_gripper(Writer& xml) {
-  const auto masks = fmt::format(R"(contype="{}" conaffinity="{}")", kRobot, kWall);
-  const auto finger = [&](const char* name, int side) {
-    const double y = side * hand::kFingerThickness / 2;
-    xml.line(R"(<body name="finger_{}" pos="0 {} {}">)", name, y, hand::kFingerZ - hand::kPalmZ);
-    xml.line(R"(<joint name="finger_{}" type="slide" axis="0 {} 0" range="0 {}" limited="true" armature="{}"/>)", name,
-             side, hand::kStroke / 2, kFingerDrive.inertia);
-    xml.line(R"(<geom name="finger_{}" type="box" pos="{} 0 0" size="{} {} {}" mass="0.1" material="steel" {}/>)", name,
-             hand::kFingerLength / 2, hand::kFingerLength / 2, hand::kFingerThickness / 2, hand::kFingerHeight / 2,
-             masks);
-    xml.line("</body>");
-  };
-  xml.line(R"(<body name="gripper" pos="0 0 {}">)", hand::kPalmZ);
-  xml.line(R"(<joint name="gripper_x" type="slide" axis="1 0 0" armature="{}"/>)", kBaseDrive.inertia);
-  xml.line(R"(<joint name="gripper_y" type="slide" axis="0 1 0" armature="{}"/>)", kBaseDrive.inertia);
-  xml.line(R"(<joint name="gripper_rotation" type="hinge" axis="0 0 1" armature="{}"/>)", kWristDrive.inertia);
-  xml.line(R"(<geom name="palm" type="box" pos="{} 0 0" size="{} {} {}" mass="0.9" material="dark" {}/>)",
-           -hand::kPalmDepth / 2, hand::kPalmDepth / 2, hand::kPalmWidth / 2, hand::kPalmHeight / 2, masks);
-  xml.line(R"(<geom name="arm" type="box" pos="{} 0 0" size="{} {} {}" mass="0.1" material="arm" {}/>)",
-           -hand::kPalmDepth - hand::kArmLength / 2, hand::kArmLength / 2, hand::kArmWidth / 2, hand::kPalmHeight / 2,
-           masks);
-  finger("left", +1);
-  finger("right", -1);
-  xml.line("</body>");
+// The robot's first link where the base puts it. Joints come in the order of the model, as children follow parents.
+void write_robot(Writer& xml, const SceneRobot& robot) {
+  int mesh = 0;
+  for (std::size_t i = 0; i < robot.model.links.size(); ++i) {
+    const Link& link = robot.model.links[i];
+    if (link.parent >= 0) continue;
+    Pose place = link.pose;
+    if (!(robot.base == Pose{})) {
+      place = pose_of(transform(robot.base) * transform(link.pose));
+    }
+    write_link(xml, robot.model, static_cast<int>(i), place, mesh);
+  }
 }
 
 void write_object(Writer& xml, const SceneObject& object, bool is_target, bool is_free) {
@@ -179,9 +228,9 @@ void write_object(Writer& xml, const SceneObject& object, bool is_target, bool i
   xml.line("</body>");
 }
 
-void write_drive(Writer& xml, const char* joint, const Drive& drive) {
-  xml.line(R"(<velocity joint="{}" kv="{}" forcelimited="true" forcerange="{} {}"/>)", joint, drive.gain, -drive.limit,
-           drive.limit);
+void write_drive(Writer& xml, const Joint& joint) {
+  xml.line(R"(<velocity joint="{}" kv="{}" forcelimited="true" forcerange="{} {}"/>)", quoted(joint.name), joint.gain,
+           -joint.force_limit, joint.force_limit);
 }
 
 }  // namespace
@@ -201,29 +250,19 @@ std::string model_xml(const Scene& scene, const ModelContent& content) {
       scene.physics.time_step, scene.physics.iterations, scene.physics.tolerance,
       scene.physics.integrator == "rk4" ? "RK4" : "Euler");
   xml.line(R"(<size nconmax="{}" njmax="{}" nuser_geom="1"/>)", contacts, 4 * contacts + 8);
-  write_looks(xml, content.looks);
+  write_looks(xml, scene, content.looks);
   xml.line("<worldbody>");
-  write_view(xml, scene.surface, !scene.robot.is_pusher());
+  write_view(xml, scene);
   write_surface(xml, scene.surface);
-  if (scene.robot.is_pusher()) {
-    write_pusher(xml, scene.robot);
-  } else {
-    write_gripper(xml);
-  }
+  for (const Fixture& fixture : scene.fixtures) write_fixture(xml, fixture);
+  write_robot(xml, scene.robot);
   for (int i = 0; i < objects; ++i) {
     write_object(xml, scene.objects[static_cast<std::size_t>(i)], i == scene.target(), i < free);
   }
   xml.line("</worldbody>");
   xml.line("<actuator>");
-  if (scene.robot.is_pusher()) {
-    write_drive(xml, "pusher_x", kPusherDrive);
-    write_drive(xml, "pusher_y", kPusherDrive);
-  } else {
-    write_drive(xml, "gripper_x", kBaseDrive);
-    write_drive(xml, "gripper_y", kBaseDrive);
-    write_drive(xml, "gripper_rotation", kWristDrive);
-    write_drive(xml, "finger_left", kFingerDrive);
-    write_drive(xml, "finger_right", kFingerDrive);
+  for (const Joint& joint : scene.robot.model.joints) {
+    if (joint.gain > 0) write_drive(xml, joint);
   }
   xml.line("</actuator>");
   xml.line("</mujoco>");

@@ -143,13 +143,13 @@ ReducedSimulator::ReducedSimulator(WorldPtr world, const Fidelity& fidelity)
 ReducedSimulator::~ReducedSimulator() = default;
 
 bool stands_still(const TaskGeometry& geometry, const State& x, std::size_t object) {
-  const ObjectSlot& slot = geometry.layout.objects[object];
-  const double* q = &x.q[static_cast<std::size_t>(slot.q)];
-  const double* v = &x.v[static_cast<std::size_t>(slot.v)];
-  return squared_norm(v) < kStillSpeed * kStillSpeed && squared_norm(v + 3) < kStillRotation * kStillRotation &&
-         std::abs(q[0]) <= geometry.half_x && std::abs(q[1]) <= geometry.half_y &&
-         std::abs(q[2] - geometry.rest_heights[object]) < kStandingHeight &&
-         2 * (q[4] * q[4] + q[5] * q[5]) < kStandingLean;
+  const ObjectView seen = geometry.view(x).object(object);
+  const double* p = seen.position();
+  const double* q = seen.orientation();
+  return squared_norm(seen.linear_velocity()) < kStillSpeed * kStillSpeed &&
+         squared_norm(seen.angular_velocity()) < kStillRotation * kStillRotation &&
+         geometry.surface.carries(p[0], p[1]) && std::abs(p[2] - geometry.rest_heights[object]) < kStandingHeight &&
+         2 * (q[1] * q[1] + q[2] * q[2]) < kStandingLean;
 }
 
 void ReducedSimulator::freeze(const State& x) {
@@ -167,7 +167,7 @@ ReducedSimulator::Part& ReducedSimulator::enter(const State& x, std::span<const 
   }
   part->assign(free_);
   part->inject(world_->geometry().layout, x);
-  set_controls(*part->data, u);
+  set_controls(world_->scene().robot.model, *part->data, u);
   return *part;
 }
 
@@ -217,7 +217,8 @@ void ReducedSimulator::run(Advance& result, State& x, std::span<const double> u,
       part = &enter(x, u);
       mj_step1(part->model.get(), part->data.get());
     }
-    mj_step2(part->model.get(), part->data.get());
+    note_contacts(*part->model, *part->data, world_->scene(), result.facts);
+    finish_step(*part->model, *part->data, world_->scene().robot.model);
     ++result.engine_steps;
   }
   result.diverged = divergence(*part->model, *part->data);

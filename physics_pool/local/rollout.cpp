@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "physics_pool/objective/bound.hpp"
-#include "physics_pool/objective/tally.hpp"
+#include "physics_pool/api/tally.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -52,7 +52,7 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
       outcome.reason = std::move(advance.diverged);
       return finish(End::kDiverged);
     }
-    if (const std::optional<End> end = tally.count(x)) {
+    if (const std::optional<End> end = tally.count(x, advance.facts)) {
       if (*end == End::kSucceeded) signals.offer_success(sample);
       if (*end == End::kCompleted) signals.offer_cost(tally.sum());
       return finish(*end);

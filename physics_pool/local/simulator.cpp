@@ -12,10 +12,21 @@ void Simulator::begin(const State& x, std::span<const double> u) {
   std::ranges::copy(x.q, data_->qpos);
   std::ranges::copy(x.v, data_->qvel);
   forget(*world_->model(), *data_);
-  set_controls(*data_, u);
+  facts_ = {};
+  set_controls(world_->scene().robot.model, *data_, u);
 }
 
-void Simulator::step() { mj_step(world_->model(), data_.get()); }
+void Simulator::step() {
+  const Scene& scene = world_->scene();
+  // The engine's own step where there is nothing to do in its middle: RK4 has none.
+  if (scene.fixtures.empty() && !scene.robot.model.carries_itself) {
+    mj_step(world_->model(), data_.get());
+    return;
+  }
+  mj_step1(world_->model(), data_.get());
+  note_contacts(*world_->model(), *data_, scene, facts_);
+  finish_step(*world_->model(), *data_, scene.robot.model);
+}
 
 std::string Simulator::divergence() const { return physics_pool::divergence(*world_->model(), *data_); }
 
@@ -41,6 +52,7 @@ Advance Simulator::advance(State& x, std::span<const double> u, int engine_steps
       ++result.engine_steps;
     }
     result.diverged = divergence();
+    result.facts = facts_;
     read(x);
   } catch (const EngineError& error) {
     // The engine was left in the middle of a step: its scratch is unusable.

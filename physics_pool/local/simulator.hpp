@@ -24,11 +24,13 @@ class Simulator final : public Dynamics {
   void step();
   std::string divergence() const;
   void read(State& x) const;
+  const StepFacts& facts() const { return facts_; }  ///< since begin()
   void add_velocity(int dof, double amount);
 
  private:
   WorldPtr world_;
   DataPtr data_;
+  StepFacts facts_;  // since begin()
 };
 
 /// Moves objects apart that overlap in x, as happens when a belief of shapes

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <mutex>
 
@@ -37,6 +38,40 @@ Result<ModelPtr> compile_xml(const std::string& xml) {
   return model;
 }
 
+// Whether anything is inside a fixture or an arm when the scene starts. Of what stands on the surface and of robots
+// that move in the plane the scene's own check knows more.
+Result<void> check_start(const World& world) {
+  const Scene& scene = world.scene();
+  if (scene.fixtures.empty() && as_planar(scene.robot.model)) return {};
+  constexpr double kDeep = 0.0005;  // m
+  const mjModel& model = *world.model();
+  const DataPtr data(mj_makeData(&model));
+  const State x = initial_state(scene);
+  std::ranges::copy(x.q, data->qpos);
+  try {
+    mj_forward(&model, data.get());
+  } catch (const EngineError& error) {
+    return Error{Code::kInvalidArgument, fmt::format("scene '{}': the engine refused its start: {}", scene.name, error.what())};
+  }
+  const auto name = [&](int geom) -> std::string {
+    const int first_object = model.ngeom - static_cast<int>(scene.objects.size());
+    if (geom >= first_object) return fmt::format("object '{}'", scene.objects[static_cast<std::size_t>(geom - first_object)].name);
+    const char* known = mj_id2name(&model, mjOBJ_GEOM, geom);
+    const char* body = mj_id2name(&model, mjOBJ_BODY, model.geom_bodyid[geom]);
+    return known ? fmt::format("'{}'", known) : fmt::format("robot link '{}'", body ? body : "?");
+  };
+  for (int i = 0; i < data->ncon; ++i) {
+    const mjContact& contact = data->contact[i];
+    const bool stands = model.geom_type[contact.geom1] == mjGEOM_PLANE || model.geom_type[contact.geom2] == mjGEOM_PLANE;
+    if (stands || contact.dist >= -kDeep) continue;
+    return Error{Code::kInvalidArgument,
+                 fmt::format("scene '{}': at its start {} is {:.1f} mm inside {}, wanted free places; move one of them, or "
+                             "robot.start",
+                             scene.name, name(contact.geom2), -1e3 * contact.dist, name(contact.geom1))};
+  }
+  return {};
+}
+
 }  // namespace
 
 World::World(const Scene& scene, ModelPtr model)
@@ -57,6 +92,7 @@ Result<WorldPtr> World::compile(const Scene& scene, Purpose purpose) {
                  fmt::format("scene '{}': compiled to nq {} and nv {}, its layout says {} and {}", scene.name,
                              world->model()->nq, world->model()->nv, layout.nq, layout.nv)};
   }
+  if (auto ok = check_start(*world); !ok) return ok.error();
   return world;
 }
 

@@ -5,12 +5,12 @@
 #include <span>
 
 #include "idl/types/state.hpp"
-#include "physics_pool/api/objective.hpp"
-#include "physics_pool/objective/terms.hpp"
+#include "physics_pool/objective/objective.hpp"
+#include "physics_pool/task/task_geometry.hpp"
 
 namespace jostle::physics_pool {
 
-/// Of a rollout before control step `done`, whose controls are known.
+/// What is certain of a rollout before control step `done`, whose controls are known.
 struct Outlook {
   double cost = 0.0;        ///< at least this is still to come: running costs and goal
   bool may_succeed = true;  ///< the goal can still be reached
@@ -28,8 +28,8 @@ struct Outlook {
 /// hand and what turns with it at the target's distance would. A target that is
 /// squeezed out of a wedge or flung by a lever could; none of some thousand random
 /// pushes did (bound_test.cpp, and equal plans in `jostle bench cheap-physics`).
-/// Of a pushed target's way to its goal nothing is foretold: it may have been given
-/// any speed.
+/// Nothing is foretold of how a pushed target comes to its goal, which may have been given any speed, nor of arms
+/// that do not move in the plane.
 ///
 /// `u_before`: control before step `done`.
 Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls, int done,

@@ -9,7 +9,7 @@
 #include <set>
 #include <tuple>
 
-#include "physics_pool/objective/tally.hpp"
+#include "physics_pool/api/tally.hpp"
 #include "physics_pool/parareal/levels.hpp"
 
 namespace jostle::physics_pool {

@@ -11,18 +11,12 @@ constexpr double kFallen = 0.1;  // m below the resting height
 
 double difference(double a, double b) { return std::remainder(a - b, 2 * std::numbers::pi); }
 
-double yaw(const double* quaternion) {
-  const double w = quaternion[0], x = quaternion[1], y = quaternion[2], z = quaternion[3];
-  return std::atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
-}
-
 }  // namespace
 
 PlanarUpdate::PlanarUpdate(const Scene& scene)
     : layout_(layout_of(scene)),
-      half_x_(scene.surface.size[0] / 2),
-      half_y_(scene.surface.size[1] / 2),
-      pusher_{.radius = scene.robot.radius} {
+      surface_(scene.surface),
+      pusher_{.radius = disc_radius(scene.robot.model).value_or(0.0)} {
   for (const SceneObject& object : scene.objects) {
     outlines_.push_back(outline(object));
     rest_heights_.push_back(object.rest_height());
@@ -53,9 +47,9 @@ void PlanarUpdate::replace(State& x, std::span<const double> planar) const {
     double* const v = &x.v[static_cast<std::size_t>(layout_.objects[slider].v)];
     const double* pose = &planar[static_cast<std::size_t>(at.pose(i))];
     const double* velocity = &planar[static_cast<std::size_t>(at.velocity(i))];
-    const double turn = difference(pose[2], yaw(q + 3));
+    const double turn = difference(pose[2], yaw_of(q + 3));
     displace(x, slider, pose[0] - q[0], pose[1] - q[1], turn);
-    if (std::abs(q[0]) > half_x_ || std::abs(q[1]) > half_y_) q[2] = std::min(q[2], rest_heights_[slider] - kFallen);
+    if (!surface_.carries(q[0], q[1])) q[2] = std::min(q[2], rest_heights_[slider] - kFallen);
     std::fill_n(v, 6, 0.0);
     std::copy_n(velocity, 2, v);
     v[5] = velocity[2];
@@ -103,7 +97,7 @@ void PlanarUpdate::project(State& x) const {
   const PlanarPose pusher(x.q[0], x.q[1], 0.0);
   const auto pose = [&](std::size_t i) {
     const double* q = &x.q[static_cast<std::size_t>(layout_.objects[i].q)];
-    return PlanarPose(q[0], q[1], yaw(q + 3));
+    return PlanarPose(q[0], q[1], yaw_of(q + 3));
   };
   const auto stands = [&](std::size_t i) {
     return x.q[static_cast<std::size_t>(layout_.objects[i].q) + 2] > rest_heights_[i] - kFallen / 2;
@@ -142,7 +136,7 @@ PlanarUpdate::Change PlanarUpdate::change(const State& a, const State& b) const 
     const double* p = &a.q[static_cast<std::size_t>(slot.q)];
     const double* q = &b.q[static_cast<std::size_t>(slot.q)];
     largest.translation = std::max(largest.translation, std::hypot(p[0] - q[0], p[1] - q[1]));
-    largest.rotation = std::max(largest.rotation, std::abs(difference(yaw(p + 3), yaw(q + 3))));
+    largest.rotation = std::max(largest.rotation, std::abs(difference(yaw_of(p + 3), yaw_of(q + 3))));
   }
   return largest;
 }

@@ -55,7 +55,7 @@ class PlanarUpdate {
   void displace(State& x, std::size_t slider, double dx, double dy, double turn) const;
 
   StateLayout layout_;
-  double half_x_, half_y_;  // m, of the surface
+  Surface surface_;
   Outline pusher_;
   std::vector<Outline> outlines_;
   std::vector<double> rest_heights_;

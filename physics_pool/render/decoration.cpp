@@ -2,12 +2,10 @@
 
 #include <array>
 
-#include "physics_pool/scene/planar_gripper.hpp"
 
 namespace jostle::physics_pool {
 namespace {
 
-namespace hand = planar_gripper;
 
 using Vector = std::array<mjtNum, 3>;
 using Colour = std::array<float, 4>;
@@ -50,14 +48,17 @@ void add_wrist(const mjModel& model, const mjData& data, mjvScene& scene) {
   const int body = mj_name2id(&model, mjOBJ_BODY, "gripper");
   const mjtNum* position = data.xpos + 3 * body;
   const mjtNum* rotation = data.xmat + 9 * body;
-  const double top = hand::kPalmHeight / 2;
+  // Half sizes of the palm and of what is behind it.
+  const mjtNum* palm = model.geom_size + 3 * mj_name2id(&model, mjOBJ_GEOM, "palm");
+  const mjtNum* arm = model.geom_size + 3 * mj_name2id(&model, mjOBJ_GEOM, "arm");
+  const double top = palm[2], wrist = -2 * palm[0], elbow = wrist - 2 * arm[0];
   const auto cap = [&](double x, double radius, double half_height, const Colour& colour) {
     add(position, rotation, {mjGEOM_CYLINDER, {radius, half_height, 0}, {x, 0, top}, colour}, scene);
   };
-  cap(-hand::kPalmDepth - 0.045, 0.040, 0.012, kFlangeColour);
-  cap(-hand::kPalmDepth - 0.045, 0.032, 0.016, kJointColour);
-  cap(-hand::kPalmDepth - hand::kArmLength + 0.045, 0.040, 0.012, kFlangeColour);
-  cap(-hand::kPalmDepth - hand::kArmLength + 0.045, 0.032, 0.016, kJointColour);
+  cap(wrist - 0.045, 0.040, 0.012, kFlangeColour);
+  cap(wrist - 0.045, 0.032, 0.016, kJointColour);
+  cap(elbow + 0.045, 0.040, 0.012, kFlangeColour);
+  cap(elbow + 0.045, 0.032, 0.016, kJointColour);
 }
 
 // Flat, its top `height` metres above the surface: the higher one covers the other.
@@ -73,8 +74,11 @@ void add_disc(const Disc& disc, double height, const Colour& colour, mjvScene& s
 }  // namespace
 
 void decorate(const SceneTask& task, const mjModel& model, const mjData& data, mjvScene& scene) {
-  if (task.is_push()) add_disc(task.goal, 0.001, kGoalColour, scene);
+  if (const TaskKind* kind = find_task_kind(task.kind); kind && kind->has_goal) add_disc(task.goal, 0.001, kGoalColour, scene);
   if (task.obstacle) add_disc(*task.obstacle, 0.002, kObstacleColour, scene);
+  for (const char* part : {"palm", "arm", "finger_left", "finger_right"}) {
+    if (mj_name2id(&model, mjOBJ_GEOM, part) < 0) return;
+  }
   if (mj_name2id(&model, mjOBJ_BODY, "gripper") < 0) return;
   add_pad(model, data, "finger_left", scene);
   add_pad(model, data, "finger_right", scene);

@@ -4,6 +4,7 @@
 
 #include "physics_pool/local/engine.hpp"
 #include "physics_pool/scene/scene.hpp"
+#include "physics_pool/scene/task_kind.hpp"
 
 namespace jostle::physics_pool {
 

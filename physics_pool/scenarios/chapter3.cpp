@@ -45,8 +45,8 @@ Result<Scene> generate_chapter3(const GenerateOptions& options) {
   CounterStream random(options.seed, kSceneStream);
   Scene scene;
   scene.name = fmt::format("chapter3-{}-{}", options.objects, options.seed);
-  scene.surface.size = {side, side};
-  scene.robot = {.x = kStart - (side - kTable) / 2, .y = 0.0, .rotation = 0.0, .opening = 0.085};
+  scene.surface = Surface::table(side, side);
+  scene.robot = planar_gripper({.x = kStart - (side - kTable) / 2});
   scene.task = {.kind = "grasp", .target = "target"};
 
   SceneObject target{.name = "target", .shape = Shape::kBox};
@@ -56,8 +56,8 @@ Result<Scene> generate_chapter3(const GenerateOptions& options) {
   target.yaw = random.uniform(-std::numbers::pi, std::numbers::pi);
 
   scene.objects.push_back(target);
-  const double reach_x = scene.surface.size[0] / 2 - options.edge_distance;
-  const double reach_y = scene.surface.size[1] / 2 - options.edge_distance;
+  const double reach_x = side / 2 - options.edge_distance;
+  const double reach_y = side / 2 - options.edge_distance;
   for (int i = 0; i < options.objects; ++i) {
     SceneObject object{.name = fmt::format("object{}", i + 1), .shape = random.coin() ? Shape::kBox : Shape::kCylinder};
     draw_body(random, object);

@@ -56,12 +56,11 @@ double largest_radius(const SceneObject& object) {
 // free, then forward by what is known to be free.
 void place_pusher(Scene& scene, const SceneObject& target, const Way& way, double gap) {
   constexpr double kClose = 1e-9;  // m
-  double back = largest_radius(target) + scene.robot.radius + gap;
+  const double radius = *disc_radius(scene.robot.model);
+  double back = largest_radius(target) + radius + gap;
   for (;;) {
-    scene.robot.x = way.x_at(-back, 0.0);
-    scene.robot.y = way.y_at(-back, 0.0);
-    const double free =
-        signed_distance(target, {.x = scene.robot.x, .y = scene.robot.y, .radius = scene.robot.radius}) - gap;
+    scene.robot.q = {way.x_at(-back, 0.0), way.y_at(-back, 0.0)};
+    const double free = signed_distance(target, {.x = scene.robot.q[0], .y = scene.robot.q[1], .radius = radius}) - gap;
     if (free <= kClose) return;
     back -= free;
   }
@@ -70,8 +69,8 @@ void place_pusher(Scene& scene, const SceneObject& target, const Way& way, doubl
 // Table, target, goal region and pusher; leaves the way in `way`.
 Scene begin(const GeneratePushOptions& options, CounterStream& random, Way& way) {
   Scene scene;
-  scene.surface.size = {kTableX, kTableY};
-  scene.robot.model = "pusher";
+  scene.surface = Surface::table(kTableX, kTableY);
+  scene.robot = pusher();
   scene.task = {.kind = "push", .target = "target"};
   scene.physics = {.time_step = 0.001, .integrator = options.integrator};
   SceneObject target = make_slider("target", options.shape);
@@ -102,10 +101,7 @@ bool add_slider(Scene& scene, const Way& way, Shape shape, CounterStream& random
     slider.x = way.x_at(along, left);
     slider.y = way.y_at(along, left);
     slider.yaw = shape == Shape::kBox ? random.uniform(-1.5, 1.5) : 0.0;
-    const bool is_free =
-        signed_distance(slider, kept_free) >= 0 && !overlaps_robot(scene, slider, kGap) &&
-        std::ranges::none_of(scene.objects, [&](const SceneObject& other) { return overlap(slider, other, kGap); });
-    if (!is_free) continue;
+    if (signed_distance(slider, kept_free) < 0 || !is_free(scene, slider, kGap)) continue;
     scene.objects.push_back(slider);
     return true;
   }

@@ -5,14 +5,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <numbers>
+#include <optional>
 #include <set>
 
+#include "physics_pool/robot/kinematics.hpp"
 #include "physics_pool/scene/outline.hpp"
-#include "physics_pool/scene/planar_gripper.hpp"
+#include "physics_pool/scene/task_kind.hpp"
 
 namespace jostle::physics_pool {
 namespace {
+
+constexpr double kSmallest = 0.002, kLargest = 2.0;  // m, any size of an object
 
 // An outline somewhere in the surface's plane.
 struct Footprint {
@@ -26,22 +32,34 @@ Footprint footprint(const SceneObject& object) {
 
 Footprint footprint(const Disc& disc) { return {.x = disc.x, .y = disc.y, .outline = {.radius = disc.radius}}; }
 
+// What of a geom that stands upright one sees from above; nothing of others.
+std::optional<Footprint> footprint(const Eigen::Isometry3d& X_WG, const RobotGeom& geom) {
+  constexpr double kUpright = 1 - 1e-6;
+  const Eigen::Matrix3d& R = X_WG.linear();
+  if (R(2, 2) < kUpright) return {};
+  Footprint seen{.x = X_WG.translation().x(), .y = X_WG.translation().y(), .yaw = std::atan2(R(1, 0), R(0, 0))};
+  if (geom.shape == GeomShape::kBox) {
+    seen.outline = {.half_x = geom.size[0] / 2, .half_y = geom.size[1] / 2};
+  } else if (geom.shape == GeomShape::kCylinder) {
+    seen.outline = {.radius = geom.radius};
+  } else {
+    return {};
+  }
+  return seen;
+}
+
+// Of a robot that moves in the plane; empty for others.
 std::vector<Footprint> footprint(const SceneRobot& robot) {
-  namespace hand = planar_gripper;
-  if (robot.is_pusher()) return {footprint(Disc{robot.x, robot.y, robot.radius})};
-  const double c = std::cos(robot.rotation), s = std::sin(robot.rotation);
-  const auto part = [&](double x_min, double x_max, double y, double width) {
-    const double x = (x_min + x_max) / 2;
-    return Footprint{.x = robot.x + c * x - s * y,
-                     .y = robot.y + s * x + c * y,
-                     .yaw = robot.rotation,
-                     .outline = {.half_x = (x_max - x_min) / 2, .half_y = width / 2}};
-  };
-  const double finger_y = (robot.opening + hand::kFingerThickness) / 2;
-  return {part(0, hand::kFingerLength, finger_y, hand::kFingerThickness),
-          part(0, hand::kFingerLength, -finger_y, hand::kFingerThickness),
-          part(-hand::kPalmDepth, 0, 0, hand::kPalmWidth),
-          part(-hand::kPalmDepth - hand::kArmLength, -hand::kPalmDepth, 0, hand::kArmWidth)};
+  std::vector<Footprint> parts;
+  if (!as_planar(robot.model)) return parts;
+  const Eigen::Isometry3d base = transform(robot.base);
+  for (std::size_t i = 0; i < robot.model.links.size(); ++i) {
+    const Eigen::Isometry3d X_WL = link_pose(robot.model, base, robot.q, static_cast<int>(i));
+    for (const RobotGeom& geom : robot.model.links[i].geoms) {
+      if (const auto part = footprint(X_WL * transform(geom.pose), geom)) parts.push_back(*part);
+    }
+  }
+  return parts;
 }
 
 double disc_gap(const Footprint& disc, const Footprint& other) {
@@ -99,8 +117,6 @@ Result<void> check(const Locate& locate, const Field& parent, std::initializer_l
   return {};
 }
 
-constexpr double kSmallest = 0.002, kLargest = 2.0;  // m, any size of an object
-
 // One of a field's words, or the complaint.
 Result<void> check_word(const Locate& locate, const char* field, const std::string& got,
                         std::initializer_list<const char*> words) {
@@ -108,13 +124,81 @@ Result<void> check_word(const Locate& locate, const char* field, const std::stri
   return invalid(locate, {field, field}, fmt::format("got '{}', wanted one of: {}", got, fmt::join(words, ", ")));
 }
 
-// What only pushing has.
-Result<void> check_push(const Scene& scene, const Locate& locate) {
-  const double half_x = scene.surface.size[0] / 2, half_y = scene.surface.size[1] / 2;
+Result<void> check_surface(const Surface& surface, const Locate& locate) {
+  if (surface.parts.empty()) return invalid(locate, {"surface", "surface"}, "got no part, wanted a rectangle");
+  for (std::size_t i = 0; i < surface.parts.size(); ++i) {
+    const Rectangle& part = surface.parts[i];
+    const std::string field = surface.parts.size() == 1 ? "surface." : fmt::format("surface.parts[{}].", i);
+    if (auto ok = check(locate, {field, field},
+                        {{"size[0]", part.size[0], 0.02, 10, "m"},
+                         {"size[1]", part.size[1], 0.02, 10, "m"},
+                         {"x", part.x, -10, 10, "m"},
+                         {"y", part.y, -10, 10, "m"}});
+        !ok) {
+      return ok;
+    }
+    for (std::size_t k = 0; k < i; ++k) {
+      const Rectangle& other = surface.parts[k];
+      constexpr double kTouch = 1e-9;  // m; parts that share a side do not overlap
+      if (std::min(part.high_x(), other.high_x()) - std::max(part.low_x(), other.low_x()) > kTouch &&
+          std::min(part.high_y(), other.high_y()) - std::max(part.low_y(), other.low_y()) > kTouch) {
+        return invalid(locate, {field, field},
+                       fmt::format("overlaps part {}, wanted parts that meet at their sides: what stands on two would be "
+                                   "held up twice",
+                                   k));
+      }
+    }
+  }
+  return {};
+}
+
+Result<void> check_fixture(const Fixture& fixture, const Field& parent, const Locate& locate) {
+  if (fixture.name.empty()) return invalid(locate, {parent.path + "name", parent.shown + "name"}, "got '', wanted a name");
+  auto sizes = fixture.shape == Shape::kBox
+                   ? check(locate, parent,
+                           {{"size[0]", fixture.size[0], kSmallest, 10, "m"},
+                            {"size[1]", fixture.size[1], kSmallest, 10, "m"},
+                            {"size[2]", fixture.size[2], kSmallest, 10, "m"}})
+                   : check(locate, parent,
+                           {{"radius", fixture.radius, kSmallest, 10, "m"}, {"height", fixture.height, kSmallest, 10, "m"}});
+  if (!sizes) return sizes;
+  const auto& [p, q] = fixture.pose;
+  const double length = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  return check(locate, parent,
+               {{"pose.position[0]", p[0], -10, 10, "m"},
+                {"pose.position[1]", p[1], -10, 10, "m"},
+                {"pose.position[2]", p[2], -10, 10, "m"},
+                {"pose.orientation", length, 1 - 1e-6, 1 + 1e-6, "as the squared length of a unit quaternion"}});
+}
+
+Result<void> check_robot(const SceneRobot& robot, const Locate& locate) {
+  if (auto ok = validate(robot.model); !ok) {
+    const std::string& message = ok.error().message;  // "robot.links[2]…: got …"
+    return Error{ok.error().code, fmt::format("{}: {}", locate(message.substr(0, message.find_first_of("[:"))), message)};
+  }
+  if (robot.q.size() != robot.model.joints.size()) {
+    return invalid(locate, {"robot.start", "robot.start"},
+                   fmt::format("got {} joints, wanted {}", robot.q.size(), robot.model.joints.size()));
+  }
+  for (std::size_t i = 0; i < robot.q.size(); ++i) {
+    const Joint& joint = robot.model.joints[i];
+    const std::string field = "robot.start." + joint.name;
+    if (auto ok = check(locate, {field, field},
+                        {{"", robot.q[i], std::max(joint.low, -10.0), std::min(joint.high, 10.0),
+                          joint.kind == JointKind::kSlide ? "m" : "rad"}});
+        !ok) {
+      return ok;
+    }
+  }
+  return {};
+}
+
+Result<void> check_discs(const Scene& scene, const Locate& locate) {
+  const Rectangle bounds = scene.surface.bounds();
   const auto check_disc = [&](const std::string& field, const Disc& disc) {
     return check(locate, {field, field},
-                 {{".x", disc.x, -half_x, half_x, "m, on the surface"},
-                  {".y", disc.y, -half_y, half_y, "m, on the surface"},
+                 {{".x", disc.x, bounds.low_x(), bounds.high_x(), "m, on the surface"},
+                  {".y", disc.y, bounds.low_y(), bounds.high_y(), "m, on the surface"},
                   {".radius", disc.radius, kSmallest, kLargest, "m"}});
   };
   if (auto ok = check_disc("task.goal", scene.task.goal); !ok) return ok;
@@ -122,7 +206,44 @@ Result<void> check_push(const Scene& scene, const Locate& locate) {
   return check_disc("task.obstacle", *scene.task.obstacle);
 }
 
+constexpr double kPusherClearance = 0.001;  // m above the surface
+
+const RobotModel& builtin(const char* name) {
+  static std::map<std::string, RobotModel> models;
+  static std::mutex mutex;  // guards models
+  const std::lock_guard lock(mutex);
+  const auto [model, is_new] = models.try_emplace(name);
+  if (is_new) model->second = builtin_robot(name).value();  // a test reads every one of them
+  return model->second;
+}
+
 }  // namespace
+
+SceneRobot planar_gripper(const GripperStart& start) {
+  return {.model = builtin("planar_gripper"), .q = {start.x, start.y, start.rotation, start.opening / 2, start.opening / 2}};
+}
+
+SceneRobot pusher(const PusherStart& start) {
+  SceneRobot robot{.model = builtin("pusher"), .q = {start.x, start.y}};
+  Link& link = robot.model.links[0];
+  link.pose.position[2] = kPusherClearance + start.height / 2;
+  link.geoms[0].radius = start.radius;
+  link.geoms[0].height = start.height;
+  return robot;
+}
+
+std::vector<Fixture> shelf_walls(const Rectangle& surface, double height) {
+  constexpr double kThickness = 0.02;
+  const double half_x = surface.size[0] / 2, half_y = surface.size[1] / 2;
+  const auto wall = [&](const char* name, double x, double y, double size_x, double size_y) {
+    return Fixture{.name = name,
+                   .size = {size_x, size_y, height},
+                   .pose = {.position = {surface.x + x, surface.y + y, height / 2}}};
+  };
+  return {wall("wall_back", half_x + kThickness / 2, 0, kThickness, surface.size[1] + 2 * kThickness),
+          wall("wall_left", 0, half_y + kThickness / 2, surface.size[0], kThickness),
+          wall("wall_right", 0, -half_y - kThickness / 2, surface.size[0], kThickness)};
+}
 
 double SceneObject::rest_height() const { return (shape == Shape::kBox ? size[2] : height) / 2; }
 
@@ -155,33 +276,30 @@ Result<void> validate(const Scene& scene, const std::string& origin) {
 }
 
 Result<void> validate(const Scene& scene, const Locate& locate) {
-  const SceneRobot& robot = scene.robot;
-  if (auto ok = check_word(locate, "robot.model", robot.model, {"planar_gripper", "pusher"}); !ok) return ok;
-  if (auto ok = check_word(locate, "task.kind", scene.task.kind, {"grasp", "push"}); !ok) return ok;
-  if (robot.is_pusher() != scene.task.is_push()) {
-    return invalid(locate, {"task.kind", "task.kind"},
-                   fmt::format("got '{}' for a {}, wanted grasp with a planar_gripper or push with a pusher",
-                               scene.task.kind, robot.model));
-  }
   if (auto ok = check_word(locate, "physics.integrator", scene.physics.integrator, {"euler", "rk4"}); !ok) return ok;
-  const double half_x = scene.surface.size[0] / 2, half_y = scene.surface.size[1] / 2;
+  if (auto ok = check_surface(scene.surface, locate); !ok) return ok;
+  if (auto ok = check_robot(scene.robot, locate); !ok) return ok;
+  if (scene.robot.model.carries_itself && scene.physics.integrator == "rk4") {
+    return invalid(locate, {"physics.integrator", "physics.integrator"},
+                   "got rk4 for a robot that carries itself, wanted euler: its weight is balanced once per step");
+  }
   if (auto ok = check(locate, {},
-                      {{"surface.size[0]", scene.surface.size[0], 0.1, 10, "m"},
-                       {"surface.size[1]", scene.surface.size[1], 0.1, 10, "m"},
-                       {"surface.wall_height", scene.surface.wall_height, 0.01, 2, "m"},
-                       {"robot.start.x", robot.x, -10, 10, "m"},
-                       {"robot.start.y", robot.y, -10, 10, "m"},
-                       {"robot.start.rotation", robot.rotation, -7, 7, "rad"},
-                       {"robot.start.opening", robot.opening, 0, planar_gripper::kStroke, "m"},
-                       {"robot.radius", robot.radius, kSmallest, kLargest, "m"},
-                       {"robot.height", robot.height, kSmallest, kLargest, "m"},
-                       {"physics.time_step", scene.physics.time_step, 1e-4, 0.02, "s"},
+                      {{"physics.time_step", scene.physics.time_step, 1e-4, 0.02, "s"},
                        {"physics.iterations", double(scene.physics.iterations), 1, 1000, ""},
                        {"physics.tolerance", scene.physics.tolerance, 0, 1, ""}});
       !ok) {
     return ok;
   }
+  const Rectangle bounds = scene.surface.bounds();
   std::set<std::string> names;
+  for (std::size_t i = 0; i < scene.fixtures.size(); ++i) {
+    const Fixture& fixture = scene.fixtures[i];
+    const Field parent{fmt::format("fixtures[{}].", i), fmt::format("fixtures[{}] ('{}').", i, fixture.name)};
+    if (auto ok = check_fixture(fixture, parent, locate); !ok) return ok;
+    if (!names.insert(fixture.name).second) {
+      return invalid(locate, {parent.path + "name", parent.shown + "name"}, "already taken, wanted a unique name");
+    }
+  }
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const SceneObject& object = scene.objects[i];
     const Field parent{fmt::format("objects[{}].", i), fmt::format("objects[{}] ('{}').", i, object.name)};
@@ -190,7 +308,7 @@ Result<void> validate(const Scene& scene, const Locate& locate) {
     };
     if (object.name.empty()) return invalid_at("name", "got '', wanted a name");
     if (!names.insert(object.name).second) {
-      return invalid_at("name", "already taken by another object, wanted a unique name");
+      return invalid_at("name", "already taken, wanted a unique name");
     }
     auto sizes = object.shape == Shape::kBox ? check(locate, parent,
                                                      {{"size[0]", object.size[0], kSmallest, kLargest, "m"},
@@ -203,11 +321,14 @@ Result<void> validate(const Scene& scene, const Locate& locate) {
     if (auto ok = check(locate, parent,
                         {{"mass", object.mass, 1e-4, 100, "kg"},
                          {"friction", object.friction, 0, 5, ""},
-                         {"pose.x", object.x, -half_x, half_x, "m, on the surface"},
-                         {"pose.y", object.y, -half_y, half_y, "m, on the surface"},
+                         {"pose.x", object.x, bounds.low_x(), bounds.high_x(), "m, on the surface"},
+                         {"pose.y", object.y, bounds.low_y(), bounds.high_y(), "m, on the surface"},
                          {"pose.yaw", object.yaw, -7, 7, "rad"}});
         !ok) {
       return ok;
+    }
+    if (!scene.surface.carries(object.x, object.y)) {
+      return invalid_at("pose", fmt::format("({}, {}) is on no part of the surface, wanted one", object.x, object.y));
     }
     for (std::size_t j = 0; j < i; ++j) {
       if (!overlap(object, scene.objects[j])) continue;
@@ -219,22 +340,27 @@ Result<void> validate(const Scene& scene, const Locate& locate) {
       return invalid_at("pose", "inside the robot at its start, wanted a free place; move robot.start or the object");
     }
   }
+  const TaskKind* kind = find_task_kind(scene.task.kind);
+  if (!kind) {
+    std::vector<std::string> known;
+    for (const TaskKind* k : task_kinds()) known.push_back(k->name);
+    return invalid(locate, {"task.kind", "task.kind"},
+                   fmt::format("got '{}', wanted one of: {}", scene.task.kind, fmt::join(known, ", ")));
+  }
+  if (const std::string misfit = kind->misfit(scene); !misfit.empty()) {
+    return invalid(locate, {"task.kind", "task.kind"}, misfit);
+  }
   if (scene.target() < 0) {
     return invalid(locate, {"task.target", "task.target"},
                    fmt::format("got '{}', wanted the name of an object", scene.task.target));
   }
-  return scene.task.is_push() ? check_push(scene, locate) : Result<void>{};
+  return check_discs(scene, locate);
 }
 
 StateLayout layout_of(const Scene& scene) {
   StateLayout layout;
-  if (scene.robot.is_pusher()) {
-    layout.joints = {"pusher_x", "pusher_y"};
-    layout.nu = kPusherAxes;
-  } else {
-    layout.joints = {"gripper_x", "gripper_y", "gripper_rotation", "finger_left", "finger_right"};
-    layout.nu = kGripperAxes;
-  }
+  for (const Joint& joint : scene.robot.model.joints) layout.joints.push_back(joint.name);
+  layout.nu = static_cast<int>(scene.robot.model.axes.size());
   layout.nq = layout.nv = layout.robot_joints();
   for (const SceneObject& object : scene.objects) {
     layout.objects.push_back({.name = object.name, .q = layout.nq, .v = layout.nv});
@@ -246,10 +372,7 @@ StateLayout layout_of(const Scene& scene) {
 }
 
 State initial_state(const Scene& scene) {
-  const SceneRobot& robot = scene.robot;
-  State state;
-  state.q = {robot.x, robot.y};
-  if (!robot.is_pusher()) state.q.insert(state.q.end(), {robot.rotation, robot.opening / 2, robot.opening / 2});
+  State state{.q = scene.robot.q};
   for (const SceneObject& object : scene.objects) {
     state.q.insert(state.q.end(), {object.x, object.y, object.rest_height(), std::cos(object.yaw / 2), 0, 0,
                                    std::sin(object.yaw / 2)});

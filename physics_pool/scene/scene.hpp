@@ -13,6 +13,9 @@
 #include "idl/types/hash.hpp"
 #include "idl/types/result.hpp"
 #include "idl/types/state.hpp"
+#include "physics_pool/robot/robot_model.hpp"
+#include "physics_pool/robot/robot_yaml.hpp"
+#include "physics_pool/scene/surface.hpp"
 
 namespace jostle::physics_pool {
 
@@ -34,48 +37,57 @@ struct SceneObject {
   double rest_height() const;
 };
 
-/// The supporting surface, centred at the world's origin, top at z = 0. A shelf
-/// has walls on every side but -x, where the robot reaches in.
-struct Surface {
-  enum class Kind { kTable, kShelf };
-  Kind kind = Kind::kTable;
-  std::array<double, 2> size{0.6, 0.6};  ///< full extents x, y, m
-  double wall_height = 0.15;             ///< m, shelf only
+/// A body that never moves: a shelf's board, a wall, a box that stands in the way.
+struct Fixture {
+  std::string name;
+  Shape shape = Shape::kBox;
+  std::array<double, 3> size{};  ///< box: full extents x, y, z, m
+  double radius = 0.0;           ///< cylinder, m
+  double height = 0.0;           ///< cylinder, m
+  Pose pose;                     ///< X_WF of its centre
+
+  bool operator==(const Fixture&) const = default;
 };
 
-/// What moves at a fixed height above the surface, driven by velocities:
-///
-///   planar_gripper  its origin G is the point of Fig. 3.2: the middle of the
-///                   palm's face, x forward
-///   pusher          an upright cylinder (Sec. 6.1) that has no rotation
+/// The walls of a shelf, 2 cm thick, on every side of a rectangle but -x, where the robot reaches in.
+std::vector<Fixture> shelf_walls(const Rectangle& surface, double height);
+
+/// The robot, where it is mounted, and where it starts.
 struct SceneRobot {
-  std::string model = "planar_gripper";
-  double x = -0.3, y = 0.0;  ///< start of G, or of the pusher's axis, m
-  double rotation = 0.0;     ///< rad about z; 0 looks along +x; gripper only
-  double opening = 0.085;    ///< m between the fingers; gripper only
-  double radius = 0.0145;    ///< m, pusher only
-  double height = 0.11;      ///< m, pusher only
+  RobotModel model;
+  Pose base;              ///< X_WB
+  std::vector<double> q;  ///< [joints] at the start, m or rad
 
-  bool is_pusher() const { return model == "pusher"; }
+  bool operator==(const SceneRobot&) const = default;
 };
+
+/// Start of the planar gripper: where the middle of its palm's face is (point G of Fig. 3.2).
+struct GripperStart {
+  double x = -0.3, y = 0.0;  ///< m
+  double rotation = 0.0;     ///< rad about z; 0 looks along +x
+  double opening = 0.085;    ///< m between the fingers
+};
+SceneRobot planar_gripper(const GripperStart& start = {});
+
+/// Start and measures of the pusher, an upright cylinder (Sec. 6.1).
+struct PusherStart {
+  double x = -0.3, y = 0.0;  ///< of its axis, m
+  double radius = 0.0145;    ///< m
+  double height = 0.11;      ///< m
+};
+SceneRobot pusher(const PusherStart& start = {});
 
 /// A disc on the surface.
 struct Disc {
   double x = 0.0, y = 0.0, radius = 0.0;  // m
 };
 
-/// What is to be done with the target:
-///
-///   grasp  bring it into the hand (Ch. 3)
-///   push   bring its centre into the goal region (Sec. 6.2, 7.1), neither it nor
-///          the pusher over the obstacle, nothing else into the region
+/// What is to be done with the target. physics_pool/task has the table of kinds and what each means.
 struct SceneTask {
   std::string kind = "grasp";
   std::string target;            ///< name of an object
-  Disc goal{.radius = 0.04};     ///< push only
-  std::optional<Disc> obstacle;  ///< push only; a keep-out area, not a body
-
-  bool is_push() const { return kind == "push"; }
+  Disc goal{.radius = 0.04};     ///< where a kind has a goal region
+  std::optional<Disc> obstacle;  ///< a keep-out area, not a body
 };
 
 /// Engine options; part of the world's identity.
@@ -90,7 +102,8 @@ struct ScenePhysics {
 struct Scene {
   std::string name;
   Surface surface;
-  SceneRobot robot;
+  std::vector<Fixture> fixtures;
+  SceneRobot robot = planar_gripper();
   std::vector<SceneObject> objects;
   SceneTask task;
   ScenePhysics physics;
@@ -99,14 +112,18 @@ struct Scene {
   int target() const;
 };
 
-/// Reads and checks a scene.
-/// Errors   kIo, kInvalidArgument; the message names file, line, field, got and wanted.
+/// Reads and checks a scene of format 2, or 1 (scenes/README.md has both).
+/// `robots`: where a robot that it names is looked for; a scene that is made of text alone finds built-in models only.
+/// Errors   kIo, kNotFound, kInvalidArgument; the message names file, line, field, got and wanted.
 Result<Scene> load_scene(const std::filesystem::path& file);
-Result<Scene> parse_scene(std::string_view yaml, const std::string& origin);
+Result<Scene> parse_scene(std::string_view yaml, const std::string& origin, const RobotPath& robots = {});
 
-/// The canonical text: equal scenes give equal text, and reading it back gives
-/// the same scene bit for bit.
-std::string to_yaml(const Scene& scene);
+/// How a scene's text holds its robot: whole, or, if it is a built-in model, by its name.
+enum class RobotText { kWhole, kByName };
+
+/// The canonical text: equal scenes give equal text, and reading it back gives the same scene bit for bit. It holds
+/// the robot whole, so that whoever has the text needs no other file.
+std::string to_yaml(const Scene& scene, RobotText robot = RobotText::kWhole);
 
 /// Hash of the canonical text; the name of the world compiled from it.
 Hash scene_hash(const Scene& scene);
@@ -127,7 +144,8 @@ double signed_distance(const SceneObject& object, const Disc& disc);
 /// Whether the footprints of two objects come closer than `gap` metres.
 bool overlap(const SceneObject& a, const SceneObject& b, double gap = 0.0);
 
-/// Whether an object is inside the robot's start pose, or closer than `gap` metres.
+/// Whether an object is inside the robot's start pose as seen from above, or closer than `gap` metres. Only of robots
+/// that move in the plane: of arms the engine knows more (World::compile).
 bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap = 0.0);
 
 /// Whether an object would find its place free: nothing of the scene is nearer than `gap` metres.

@@ -1,12 +1,16 @@
 // Scenes as text.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 
 #include "idl/text/yaml_fields.hpp"
 #include "physics_pool/scene/scene.hpp"
+#include "physics_pool/scene/task_kind.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -20,32 +24,108 @@ void read_disc(Fields& fields, Disc& disc) {
   fields.required("radius", disc.radius);
 }
 
-Scene read(const YAML::Node& root, const std::string& origin) {
+// Format 1 knew two robots, one table or a shelf round the origin.
+void read_surface_1(Fields& surface, Scene& scene) {
+  bool is_shelf = false;
+  double wall_height = 0.15;
+  surface.choice<bool>("kind", is_shelf, {{"table", false}, {"shelf", true}});
+  surface.numbers("size", scene.surface.parts[0].size, false);
+  surface.optional("wall_height", wall_height);
+  if (is_shelf) scene.fixtures = shelf_walls(scene.surface.parts[0], wall_height);
+}
+
+void read_robot_1(Fields& fields, Scene& scene) {
+  enum class Model { kGripper, kPusher } model = Model::kGripper;
+  GripperStart gripper_start;
+  PusherStart pusher_start;
+  fields.choice<Model>("model", model, {{"planar_gripper", Model::kGripper}, {"pusher", Model::kPusher}});
+  fields.section("start", false, [&](Fields& start) {
+    start.optional("x", gripper_start.x);
+    start.optional("y", gripper_start.y);
+    start.optional("rotation", gripper_start.rotation);
+    start.optional("opening", gripper_start.opening);
+  });
+  fields.optional("radius", pusher_start.radius);
+  fields.optional("height", pusher_start.height);
+  pusher_start.x = gripper_start.x;
+  pusher_start.y = gripper_start.y;
+  scene.robot = model == Model::kPusher ? pusher(pusher_start) : planar_gripper(gripper_start);
+}
+
+void read_surface(Fields& fields, Scene& scene) {
+  const auto part = [](Fields& in, Rectangle& rectangle) {
+    in.optional("x", rectangle.x);
+    in.optional("y", rectangle.y);
+    in.numbers("size", rectangle.size, true);
+  };
+  if (fields.has("parts")) {
+    scene.surface.parts.clear();
+    fields.list("parts", [&](Fields& in) { part(in, scene.surface.parts.emplace_back()); });
+  } else {
+    part(fields, scene.surface.parts[0]);
+  }
+}
+
+void read_pose(Fields& in, Pose& pose) {
+  double yaw = 0.0;
+  in.numbers("position", pose.position, true);
+  in.optional("yaw", yaw);
+  if (yaw != 0) pose.orientation = turned_about_z(yaw);
+  in.numbers("orientation", pose.orientation, false);
+}
+
+Fixture read_fixture(Fields& in) {
+  Fixture fixture;
+  in.required("name", fixture.name);
+  in.choice<Shape>("shape", fixture.shape, {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}});
+  if (fixture.shape == Shape::kBox) {
+    in.numbers("size", fixture.size, true);
+  } else {
+    in.required("radius", fixture.radius);
+    in.required("height", fixture.height);
+  }
+  in.section("pose", true, [&](Fields& pose) { read_pose(pose, fixture.pose); });
+  return fixture;
+}
+
+void read_robot_2(Fields& fields, Scene& scene, const RobotPath& robots) {
+  if (fields.is_mapping("model")) {
+    fields.section("model", true, [&](Fields& model) { scene.robot.model = read_robot(model); });
+  } else {
+    std::string name = "planar_gripper";
+    fields.optional("model", name);
+    auto model_result = find_robot(name, robots);
+    if (!model_result) fields.refuse("model", model_result.error().message);
+    scene.robot.model = std::move(model_result).value();
+  }
+  fields.section("base", false, [&](Fields& base) { read_pose(base, scene.robot.base); });
+  scene.robot.q = scene.robot.model.start();
+  std::vector<std::pair<std::string, double>> start;
+  fields.pairs("start", start);
+  for (const auto& [name, value] : start) {
+    const auto joint = std::ranges::find(scene.robot.model.joints, name, &Joint::name);
+    if (joint == scene.robot.model.joints.end()) {
+      std::vector<std::string> known;
+      for (const Joint& j : scene.robot.model.joints) known.push_back(j.name);
+      fields.refuse("start", fmt::format("got joint '{}', wanted one of: {}", name, fmt::join(known, ", ")));
+    }
+    scene.robot.q[static_cast<std::size_t>(joint - scene.robot.model.joints.begin())] = value;
+  }
+}
+
+Scene read(const YAML::Node& root, const std::string& origin, const RobotPath& robots) {
   Scene scene;
   Fields fields(root, "", origin);
   int version = 0;
   fields.required("jostle_scene", version);
-  if (version != 1) {
-    throw Malformed{fmt::format("{}:{}: jostle_scene: got version {}, wanted 1", origin,
-                                yaml::line_of(root, "jostle_scene"), version)};
-  }
+  if (version != 1 && version != 2) fields.refuse("jostle_scene", fmt::format("got version {}, wanted 2 or 1", version));
   fields.optional("name", scene.name);
   fields.section("surface", false, [&](Fields& surface) {
-    surface.choice<Surface::Kind>("kind", scene.surface.kind,
-                                  {{"table", Surface::Kind::kTable}, {"shelf", Surface::Kind::kShelf}});
-    surface.numbers("size", scene.surface.size, false);
-    surface.optional("wall_height", scene.surface.wall_height);
+    version == 1 ? read_surface_1(surface, scene) : read_surface(surface, scene);
   });
+  if (version == 2) fields.optional_list("fixtures", [&](Fields& entry) { scene.fixtures.push_back(read_fixture(entry)); });
   fields.section("robot", false, [&](Fields& robot) {
-    robot.optional("model", scene.robot.model);
-    robot.section("start", false, [&](Fields& start) {
-      start.optional("x", scene.robot.x);
-      start.optional("y", scene.robot.y);
-      start.optional("rotation", scene.robot.rotation);
-      start.optional("opening", scene.robot.opening);
-    });
-    robot.optional("radius", scene.robot.radius);
-    robot.optional("height", scene.robot.height);
+    version == 1 ? read_robot_1(robot, scene) : read_robot_2(robot, scene, robots);
   });
   fields.list("objects", [&](Fields& entry) {
     SceneObject object;
@@ -69,7 +149,8 @@ Scene read(const YAML::Node& root, const std::string& origin) {
   fields.section("task", true, [&](Fields& task) {
     task.optional("kind", scene.task.kind);
     task.required("target", scene.task.target);
-    task.section("goal", scene.task.is_push(), [&](Fields& goal) { read_disc(goal, scene.task.goal); });
+    const TaskKind* kind = find_task_kind(scene.task.kind);
+    task.section("goal", kind && kind->has_goal, [&](Fields& goal) { read_disc(goal, scene.task.goal); });
     task.section("obstacle", false, [&](Fields& obstacle) { read_disc(obstacle, scene.task.obstacle.emplace()); });
   });
   fields.section("physics", false, [&](Fields& physics) {
@@ -91,9 +172,9 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
-Result<Scene> parse_scene(std::string_view text, const std::string& origin) {
+Result<Scene> parse_scene(std::string_view text, const std::string& origin, const RobotPath& robots) {
   return yaml::parse<Scene>(text, origin, [&](const YAML::Node& root) -> Result<Scene> {
-    Scene scene = read(root, origin);
+    Scene scene = read(root, origin, robots);
     const auto locate = [&](std::string_view field) {
       return fmt::format("{}:{}", origin, yaml::line_of(root, field));
     };
@@ -110,31 +191,51 @@ Result<Scene> load_scene(const std::filesystem::path& file) {
                                         "generate` makes one",
                                         file.string())};
   }
-  return parse_scene(text.str(), file.string());
+  return parse_scene(text.str(), file.string(), robot_path(file.parent_path()));
 }
 
-std::string to_yaml(const Scene& scene) {
+std::string to_yaml(const Scene& scene, RobotText robot_text_as) {
   // fmt's {} is the shortest text that reads back to the same double.
   std::string text;
   const auto line = [&]<class... T>(fmt::format_string<T...> format, T&&... values) {
     fmt::format_to(std::back_inserter(text), format, std::forward<T>(values)...);
     text += '\n';
   };
-  line("jostle_scene: 1");
+  const auto pose = [](const Pose& X) {
+    return fmt::format("{{position: [{}], orientation: [{}]}}", fmt::join(X.position, ", "), fmt::join(X.orientation, ", "));
+  };
+  line("jostle_scene: 2");
   line("name: {}", quoted(scene.name));
   line("surface:");
-  line("  kind: {}", scene.surface.kind == Surface::Kind::kTable ? "table" : "shelf");
-  line("  size: [{}, {}]", scene.surface.size[0], scene.surface.size[1]);
-  line("  wall_height: {}", scene.surface.wall_height);
+  line("  parts:");
+  for (const Rectangle& part : scene.surface.parts) {
+    line("    - {{x: {}, y: {}, size: [{}, {}]}}", part.x, part.y, part.size[0], part.size[1]);
+  }
+  if (!scene.fixtures.empty()) line("fixtures:");
+  for (const Fixture& fixture : scene.fixtures) {
+    line("  - name: {}", quoted(fixture.name));
+    if (fixture.shape == Shape::kBox) {
+      line("    shape: box");
+      line("    size: [{}, {}, {}]", fixture.size[0], fixture.size[1], fixture.size[2]);
+    } else {
+      line("    shape: cylinder");
+      line("    radius: {}", fixture.radius);
+      line("    height: {}", fixture.height);
+    }
+    line("    pose: {}", pose(fixture.pose));
+  }
   line("robot:");
-  line("  model: {}", quoted(scene.robot.model));
-  if (scene.robot.is_pusher()) {
-    line("  start: {{x: {}, y: {}}}", scene.robot.x, scene.robot.y);
-    line("  radius: {}", scene.robot.radius);
-    line("  height: {}", scene.robot.height);
+  const auto known_result = builtin_robot(scene.robot.model.name);
+  if (robot_text_as == RobotText::kByName && known_result && *known_result == scene.robot.model) {
+    line("  model: {}", scene.robot.model.name);
   } else {
-    line("  start: {{x: {}, y: {}, rotation: {}, opening: {}}}", scene.robot.x, scene.robot.y, scene.robot.rotation,
-         scene.robot.opening);
+    line("  model:");
+    text += robot_text(scene.robot.model, 4);
+  }
+  line("  base: {}", pose(scene.robot.base));
+  line("  start:");
+  for (std::size_t i = 0; i < scene.robot.q.size(); ++i) {
+    line("    {}: {}", quoted(scene.robot.model.joints[i].name), scene.robot.q[i]);
   }
   line("objects:");
   for (const SceneObject& object : scene.objects) {
@@ -157,7 +258,7 @@ std::string to_yaml(const Scene& scene) {
   const auto disc = [&](const char* key, const Disc& area) {
     line("  {}: {{x: {}, y: {}, radius: {}}}", key, area.x, area.y, area.radius);
   };
-  if (scene.task.is_push()) disc("goal", scene.task.goal);
+  if (const TaskKind* kind = find_task_kind(scene.task.kind); kind && kind->has_goal) disc("goal", scene.task.goal);
   if (scene.task.obstacle) disc("obstacle", *scene.task.obstacle);
   line("physics: {{time_step: {}, integrator: {}, iterations: {}, tolerance: {}}}", scene.physics.time_step,
        scene.physics.integrator, scene.physics.iterations, scene.physics.tolerance);

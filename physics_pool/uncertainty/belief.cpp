@@ -33,19 +33,19 @@ std::optional<Scene> draw_belief(const Scene& execution, double scale, CounterSt
       const auto noisy = [&](double value, double sigma, double least) {
         return std::max(random.normal(value, shrink * scale * sigma), least);
       };
-      const double half_x = execution.surface.size[0] / 2, half_y = execution.surface.size[1] / 2;
+      const Rectangle bounds = execution.surface.bounds();
       object = truth;
       for (double& extent : object.size) extent = noisy(extent, kSizeSigma, extent / 2);
       object.radius = noisy(object.radius, kSizeSigma, object.radius / 2);
       object.height = noisy(object.height, kSizeSigma, object.height / 2);
       object.mass = noisy(object.mass, kMassSigma, object.mass / 2);
       object.friction = noisy(object.friction, kFrictionSigma, object.friction / 2);
-      object.x = std::clamp(noisy(object.x, kPositionSigma, -half_x), -half_x, half_x);
-      object.y = std::clamp(noisy(object.y, kPositionSigma, -half_y), -half_y, half_y);
+      object.x = std::clamp(noisy(object.x, kPositionSigma, bounds.low_x()), bounds.low_x(), bounds.high_x());
+      object.y = std::clamp(noisy(object.y, kPositionSigma, bounds.low_y()), bounds.low_y(), bounds.high_y());
       object.yaw = random.normal(object.yaw, shrink * scale * kYawSigma);
       shrink *= 0.98;
-    } while (shrink > 1e-3 && !is_free(belief, object, 0.0));
-    if (!is_free(belief, object, 0.0)) return std::nullopt;
+    } while (shrink > 1e-3 && !(is_free(belief, object, 0.0) && belief.surface.carries(object.x, object.y)));
+    if (!(is_free(belief, object, 0.0) && belief.surface.carries(object.x, object.y))) return std::nullopt;
     belief.objects.push_back(object);
   }
   return belief;

@@ -6,12 +6,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "physics_pool/scene/planar_gripper.hpp"
+#include "physics_pool/objective/scorer.hpp"
 
 namespace jostle::planners {
 namespace {
-
-namespace hand = physics_pool::planar_gripper;
 
 struct Step {
   double dx = 0.0, dy = 0.0;  // m, world frame
@@ -20,13 +18,25 @@ struct Step {
 
 constexpr double kFacingSpeed = 0.3;  // rad/s, at most, in a straight step
 
+// Where G is and where it looks to.
+struct HandPlace {
+  double x = 0.0, y = 0.0, heading = 0.0;  // m, rad
+};
+
+HandPlace hand_place(const physics_pool::TaskGeometry& geometry, const State& x) {
+  const Eigen::Isometry3d X_WG = physics_pool::tool_pose(geometry, x);
+  const std::size_t rotation = 2;  // joint of a planar robot's heading
+  return {.x = X_WG.translation().x(), .y = X_WG.translation().y(), .heading = x.q[rotation]};
+}
+
 // From G to the point at pre-grasp distance in front of the target.
 Step to_pregrasp(const physics_pool::TaskGeometry& geometry, const State& x) {
-  const int q = geometry.layout.objects[static_cast<std::size_t>(geometry.layout.target)].q;
-  const double dx = x.q[q] - x.q[kJointX], dy = x.q[q + 1] - x.q[kJointY];
+  const HandPlace hand = hand_place(geometry, x);
+  const double* target = geometry.view(x).target().position();
+  const double dx = target[0] - hand.x, dy = target[1] - hand.y;
   const double distance = std::hypot(dx, dy);
-  const double share = distance > 0 ? (distance - hand::kGraspDepth) / distance : 0.0;
-  const double turn = std::remainder(std::atan2(dy, dx) - x.q[kJointRotation], 2 * std::numbers::pi);
+  const double share = distance > 0 ? (distance - geometry.robot.hand->depth) / distance : 0.0;
+  const double turn = std::remainder(std::atan2(dy, dx) - hand.heading, 2 * std::numbers::pi);
   return {.dx = share * dx, .dy = share * dy, .turn = turn};
 }
 
@@ -82,7 +92,7 @@ class Run {
     while (controls.steps() < wanted) controls.append(straight_step(before.states.back()));
     ++execution_.outcome().replans;
     ++replans_in_a_row_;
-    const bool lost = before.cost >= setup_.objective.drop && setup_.objective.drop > 0;
+    const bool lost = before.cost >= setup_.objective.weight("drop") && setup_.objective.weight("drop") > 0;
     if (auto ok = plan(lost || must_clear_hand() ? back_off() : controls, replan_iterations_); !ok) return ok;
     replan_iterations_ = execution_.plan().at_goal ? options_.few_iterations
                                                    : std::min(2 * replan_iterations_, options_.few_iterations_max);
@@ -132,9 +142,9 @@ class Run {
     if (!dropped().empty() || (options_.plan_only && execution_.has_planned())) return true;
     if (!in_hand_) return false;
     if (!options_.close_hand) return true;
-    if (auto ok = move_fingers(-hand::kStroke); !ok) return ok.error();
+    if (auto ok = move_fingers(-hand().stroke); !ok) return ok.error();
     if (in_hand_ || !dropped().empty()) return true;
-    if (auto ok = move_fingers(hand::kStroke); !ok) return ok.error();
+    if (auto ok = move_fingers(hand().stroke); !ok) return ok.error();
     execution_.plan().controls = {};
     execution_.plan().states = {x()};
     execution_.plan().at_goal = false;
@@ -158,8 +168,8 @@ class Run {
 
   // Opens or closes by `way` metres, or until the fingers meet something.
   Result<void> move_fingers(double way) {
-    std::vector<double> u(kGripperAxes, 0.0);
-    u[kControlOpening] = way / options_.step_duration;
+    std::vector<double> u = still();
+    u[opening()] = way / options_.step_duration;
     if (auto ok = execution_.move(u, Phase::kClosing); !ok) return ok;
     feel();
     return {};
@@ -178,15 +188,16 @@ class Run {
   // that what lodges between the fingers stays behind, then straight again.
   ControlSequence back_off() const {
     const int back = std::max(options_.initial_steps / 3, 1);
-    const double speed = hand::kFingerLength / (back * options_.step_duration);
+    const double speed = hand().finger_length / (back * options_.step_duration);
     State away = x();
-    ControlSequence controls;
-    std::vector<double> u(kGripperAxes, 0.0);
-    u[kControlX] = -speed * std::cos(x().q[kJointRotation]);
-    u[kControlY] = -speed * std::sin(x().q[kJointRotation]);
+    ControlSequence controls{.nu = layout().nu};
+    std::vector<double> u = still();
+    const double heading = hand_place(setup_.geometry, x()).heading;
+    u[axis_x()] = -speed * std::cos(heading);
+    u[axis_y()] = -speed * std::sin(heading);
     for (int t = 0; t < back; ++t) controls.append(u);
-    away.q[kJointX] += u[kControlX] * back * options_.step_duration;
-    away.q[kJointY] += u[kControlY] * back * options_.step_duration;
+    away.q[0] += u[axis_x()] * back * options_.step_duration;  // a planar robot's first joints
+    away.q[1] += u[axis_y()] * back * options_.step_duration;
     const int forth = std::max(options_.initial_steps - back, 1);
     controls.append(straight_line(setup_.geometry, away, forth, options_.step_duration).values);
     return controls;
@@ -198,15 +209,23 @@ class Run {
     const Step way = to_pregrasp(setup_.geometry, from);
     const double distance = std::hypot(way.dx, way.dy);
     const double speed = std::min(options_.straight_speed, distance / options_.step_duration);
-    std::vector<double> u(kGripperAxes, 0.0);
+    std::vector<double> u = still();
     if (distance > 0) {
-      u[kControlX] = speed * way.dx / distance;
-      u[kControlY] = speed * way.dy / distance;
+      u[axis_x()] = speed * way.dx / distance;
+      u[axis_y()] = speed * way.dy / distance;
     }
-    u[kControlRotation] = std::clamp(way.turn / options_.step_duration, -kFacingSpeed, kFacingSpeed);
-    u[kControlOpening] = (hand::kStroke - from.q[kJointLeft] - from.q[kJointRight]) / options_.step_duration;
+    const auto q = [&](int joint) { return from.q[static_cast<std::size_t>(joint)]; };
+    u[static_cast<std::size_t>(setup_.geometry.planar->rotation)] =
+        std::clamp(way.turn / options_.step_duration, -kFacingSpeed, kFacingSpeed);
+    u[opening()] = (hand().stroke - q(hand().left) - q(hand().right)) / options_.step_duration;
     return u;
   }
+
+  std::vector<double> still() const { return std::vector<double>(static_cast<std::size_t>(layout().nu), 0.0); }
+  const physics_pool::Hand& hand() const { return *setup_.geometry.robot.hand; }
+  std::size_t axis_x() const { return static_cast<std::size_t>(setup_.geometry.planar->x); }
+  std::size_t axis_y() const { return static_cast<std::size_t>(setup_.geometry.planar->y); }
+  std::size_t opening() const { return static_cast<std::size_t>(hand().opening); }
 
   const StateLayout& layout() const { return execution_.layout(); }
   const State& x() const { return execution_.x(); }
@@ -231,10 +250,11 @@ ControlSequence straight_line(const physics_pool::TaskGeometry& geometry, const 
                               double step_duration) {
   const Step way = to_pregrasp(geometry, x);
   const double duration = steps * step_duration;
-  ControlSequence controls;
-  for (int t = 0; t < steps; ++t) {
-    controls.append(std::array{way.dx / duration, way.dy / duration, 0.0, 0.0});
-  }
+  ControlSequence controls{.nu = geometry.layout.nu};
+  std::vector<double> u(static_cast<std::size_t>(controls.nu), 0.0);
+  u[static_cast<std::size_t>(geometry.planar->x)] = way.dx / duration;
+  u[static_cast<std::size_t>(geometry.planar->y)] = way.dy / duration;
+  for (int t = 0; t < steps; ++t) controls.append(u);
   return controls;
 }
 
@@ -245,9 +265,7 @@ double state_deviation(const StateLayout& layout, const State& a, const State& b
   for (const ObjectSlot& object : layout.objects) {
     const auto q = static_cast<std::size_t>(object.q);
     for (std::size_t i = q; i < q + 3; ++i) add(i);
-    double dot = 0.0;
-    for (std::size_t i = q + 3; i < q + 7; ++i) dot += a.q[i] * b.q[i];
-    const double angle = 2 * std::acos(std::min(std::abs(dot), 1.0));
+    const double angle = angle_between(&a.q[q + 3], &b.q[q + 3]);
     sum += angle * angle;
   }
   return std::sqrt(sum);

@@ -26,7 +26,7 @@ Result<void> Execution::observe() {
   x_ = std::move(state_result).value();
   outcome_.observed.push_back(x_);
   outcome_.dropped.clear();
-  for (const int i : physics_pool::dropped_objects(setup_.geometry, x_, setup_.objective.drop_height)) {
+  for (const int i : physics_pool::dropped_objects(setup_.geometry, x_, setup_.objective.value("drop", "height"))) {
     outcome_.dropped.push_back(layout().objects[static_cast<std::size_t>(i)].name);
   }
   return {};
@@ -119,14 +119,6 @@ Result<State> assemble_state(const StateLayout& layout, const robot_bridge::Robo
     x.v.insert(x.v.end(), found->angular.begin(), found->angular.end());
   }
   return x;
-}
-
-std::string names_of(const StateLayout& layout, const std::vector<int>& objects) {
-  std::string names;
-  for (const int i : objects) {
-    names += (names.empty() ? "" : ", ") + layout.objects[static_cast<std::size_t>(i)].name;
-  }
-  return names;
 }
 
 }  // namespace jostle::planners

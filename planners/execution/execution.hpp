@@ -12,7 +12,7 @@
 #include "idl/types/result.hpp"
 #include "idl/types/state.hpp"
 #include "perception/api/object_source.hpp"
-#include "physics_pool/objective/terms.hpp"
+#include "physics_pool/task/task_geometry.hpp"
 #include "planners/api/planner.hpp"
 #include "robot_bridge/api/robot.hpp"
 
@@ -120,8 +120,5 @@ class Execution {
 /// Error kInvalidArgument if an object of the layout is missing; names it.
 Result<State> assemble_state(const StateLayout& layout, const robot_bridge::RobotReading& robot,
                              const std::vector<perception::ObjectReading>& objects);
-
-/// Names of objects by index, "a, b".
-std::string names_of(const StateLayout& layout, const std::vector<int>& objects);
 
 }  // namespace jostle::planners

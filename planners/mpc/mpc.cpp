@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "physics_pool/objective/scorer.hpp"
+
 namespace jostle::planners {
 namespace {
 
@@ -19,9 +21,8 @@ struct Point {
 };
 
 Point target_in(const physics_pool::TaskGeometry& geometry, const State& x) {
-  const auto target = static_cast<std::size_t>(geometry.layout.target);
-  const auto q = static_cast<std::size_t>(geometry.layout.objects[target].q);
-  return {x.q[q], x.q[q + 1]};
+  const double* p = geometry.view(x).target().position();
+  return {p[0], p[1]};
 }
 
 class Run {
@@ -77,15 +78,11 @@ class Run {
     const physics_pool::TaskGeometry& geometry = setup_.geometry;
     if (!outcome.dropped.empty()) {
       outcome.reason = fmt::format("dropped {}", fmt::join(outcome.dropped, ", "));
-    } else if (physics_pool::target_hits_obstacle(geometry, x())) {
-      outcome.reason = "target hit the obstacle";
-    } else if (physics_pool::pusher_hits_obstacle(geometry, x())) {
-      outcome.reason = "pusher hit the obstacle";
-    } else if (const auto inside = physics_pool::intruders(geometry, x()); !inside.empty()) {
-      outcome.reason = fmt::format("{} in the goal region", names_of(execution_.layout(), inside));
+    } else if (const std::string failure = geometry.kind->failure(geometry, x()); !failure.empty()) {
+      outcome.reason = failure;
     } else if (physics_pool::at_goal(geometry, x(), setup_.objective)) {
       outcome.success = true;
-      outcome.reason = "target in the goal region";
+      outcome.reason = geometry.kind->achieved;
     } else if (outcome.actions >= options_.max_actions) {
       outcome.reason = fmt::format("not in the goal region after {} actions", outcome.actions);
     }
@@ -120,10 +117,13 @@ ControlSequence straight_push(const physics_pool::TaskGeometry& geometry, const 
   const physics_pool::SceneObject& shape = geometry.target;
   const double radius =
       shape.shape == physics_pool::Shape::kBox ? std::hypot(shape.size[0], shape.size[1]) / 2 : shape.radius;
-  const double reach = radius + geometry.pusher_radius + kClearance;
+  const double reach = radius + geometry.disc_radius + kClearance;
   const double stride = speed * step_duration;
-  Point target = target_in(geometry, x), pusher{x.q[kJointX], x.q[kJointY]};
-  ControlSequence controls{.nu = kPusherAxes};
+  Point target = target_in(geometry, x), pusher;
+  const Eigen::Isometry3d X_WT = physics_pool::tool_pose(geometry, x);
+  pusher = {X_WT.translation().x(), X_WT.translation().y()};
+  ControlSequence controls{.nu = geometry.layout.nu};
+  std::vector<double> u(static_cast<std::size_t>(controls.nu), 0.0);
   for (int t = 0; t < steps; ++t) {
     const double dx = geometry.task.goal.x - target.x, dy = geometry.task.goal.y - target.y;
     const double way = std::hypot(dx, dy), push = std::atan2(dy, dx);
@@ -143,7 +143,9 @@ ControlSequence straight_push(const physics_pool::TaskGeometry& geometry, const 
       step = {share * (to.x - pusher.x), share * (to.y - pusher.y)};
     }
     pusher = {pusher.x + step.x, pusher.y + step.y};
-    controls.append(std::array{step.x / step_duration, step.y / step_duration});
+    u[static_cast<std::size_t>(geometry.planar->x)] = step.x / step_duration;
+    u[static_cast<std::size_t>(geometry.planar->y)] = step.y / step_duration;
+    controls.append(u);
   }
   return controls;
 }

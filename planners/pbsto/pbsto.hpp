@@ -34,7 +34,7 @@ struct PbstoOptions {
   /// made among those. 1 screens nothing.
   int screening = 1;
   double screening_time_step = 0.005;  ///< s; longer is cheaper and ranks worse
-  physics_pool::Objective objective;
+  physics_pool::Objective objective = physics_pool::Objective::standard();
 };
 
 class Pbsto final : public Planner {

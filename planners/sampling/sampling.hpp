@@ -51,7 +51,7 @@ struct SamplingOptions {
   double step_duration = 1.0;  ///< Delta_t, s
   bool stop_losers = true;     ///< where the update allows it; never changes the plan, only its price
   physics_pool::Fidelity fidelity;
-  physics_pool::Objective objective;
+  physics_pool::Objective objective = physics_pool::Objective::standard();
 };
 
 /// Returns the cheapest sequence that was ever scored. After every update of

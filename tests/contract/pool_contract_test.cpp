@@ -13,6 +13,7 @@
 #include "tests/support/batches.hpp"
 #include "tests/support/pushing.hpp"
 #include "tests/support/worker_process.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::tests {
 namespace {
@@ -123,7 +124,7 @@ RolloutBatch almost_there(const Scene& scene) {
   if (scene.task.is_push()) {
     batch.x0.q[2] = scene.task.goal.x - scene.task.goal.radius - 0.01;  // 1 cm short of the region
     batch.x0.q[3] = scene.task.goal.y;
-    batch.x0.q[kJointX] = batch.x0.q[2] - target.radius - scene.robot.radius - 0.001;
+    batch.x0.q[kJointX] = batch.x0.q[2] - target.radius - *disc_radius(scene.robot.model) - 0.001;
     batch.x0.q[kJointY] = batch.x0.q[3];
     batch.nominal.truncate(1);
     batch.nominal.step(0)[kControlX] = 0.03;
@@ -287,7 +288,7 @@ TEST_P(PoolContract, BadFieldIsNamed) {
       {"step_duration", [](RolloutBatch& b) { b.step_duration = 1e9; }},
       {"step_duration", [](RolloutBatch& b) { b.step_duration = 0.0301; }},
       {"incumbent", [&](RolloutBatch& b) { b.incumbent = kNaN; }},
-      {"objective.edge", [](RolloutBatch& b) { b.objective.edge = -1; }},
+      {"objective.edge", [](RolloutBatch& b) { b.objective["edge"].weight = -1; }},
       {"priority", [](RolloutBatch& b) { b.priority = static_cast<Priority>(7); }},
       {"wait", [](RolloutBatch& b) { b.wait = 1h; }},
   };

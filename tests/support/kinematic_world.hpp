@@ -11,6 +11,7 @@
 #include "physics_pool/objective/terms.hpp"
 #include "planners/api/planner.hpp"
 #include "robot_bridge/api/robot.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::tests {
 
@@ -18,7 +19,7 @@ namespace jostle::tests {
 inline State moved(State x, std::span<const double> u, double duration) {
   x.q[kJointX] += u[kControlX] * duration;
   x.q[kJointY] += u[kControlY] * duration;
-  if (u.size() == kPusherAxes) return x;
+  if (u.size() == kPusherControls) return x;
   x.q[kJointRotation] += u[kControlRotation] * duration;
   x.q[kJointLeft] += u[kControlOpening] * duration / 2;
   x.q[kJointRight] += u[kControlOpening] * duration / 2;
@@ -27,7 +28,7 @@ inline State moved(State x, std::span<const double> u, double duration) {
 
 class KinematicRobot final : public robot_bridge::Robot {
  public:
-  explicit KinematicRobot(State& x, int joints = kGripperJoints) : x_(x), joints_(joints) {}
+  explicit KinematicRobot(State& x, int joints = 5) : x_(x), joints_(joints) {}
 
   Result<robot_bridge::RobotReading> read() override {
     if (read_error) return *read_error;

@@ -37,8 +37,8 @@ inline physics_pool::Network random_network(int width = 12, std::uint64_t seed =
 inline physics_pool::Scene slider_scene(int sliders) {
   physics_pool::Scene scene;
   scene.name = "sliders";
-  scene.surface.size = {2.0, 2.0};
-  scene.robot = {.model = "pusher", .x = -0.5};
+  scene.surface = physics_pool::Surface::table(2.0, 2.0);
+  scene.robot = physics_pool::pusher({.x = -0.5});
   for (int i = 0; i < sliders; ++i) {
     scene.objects.push_back({.name = "slider_" + std::to_string(i),
                              .shape = physics_pool::Shape::kCylinder,

@@ -9,6 +9,7 @@
 
 #include "physics_pool/api/rollout.hpp"
 #include "physics_pool/scene/scene.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::tests {
 
@@ -33,8 +34,8 @@ inline physics_pool::SceneObject slider_box(std::string name, double x, double y
 inline physics_pool::Scene pushing_scene(double x, double y, std::vector<physics_pool::SceneObject> sliders) {
   physics_pool::Scene scene;
   scene.name = "pushing";
-  scene.surface.size = {2.0, 2.0};
-  scene.robot = {.model = "pusher", .x = x, .y = y};
+  scene.surface = physics_pool::Surface::table(2.0, 2.0);
+  scene.robot = physics_pool::pusher({.x = x, .y = y});
   scene.task = {.kind = "push", .target = sliders.front().name, .goal = {.x = 0.4, .y = 0.0, .radius = 0.05}};
   scene.objects = std::move(sliders);
   scene.physics.time_step = 0.001;
@@ -54,7 +55,7 @@ inline physics_pool::RolloutBatch pushes(const physics_pool::Scene& scene, std::
   physics_pool::RolloutBatch batch;
   batch.world = physics_pool::scene_hash(scene);
   batch.x0 = physics_pool::initial_state(scene);
-  batch.nominal.nu = kPusherAxes;
+  batch.nominal.nu = kPusherControls;
   for (int t = 0; t < steps; ++t) batch.nominal.append(u);
   batch.u_before = {0.0, 0.0};
   batch.step_duration = duration;

@@ -34,7 +34,7 @@ inline physics_pool::SceneObject cylinder(std::string name, double x, double y) 
 inline physics_pool::Scene target_only() {
   physics_pool::Scene scene;
   scene.name = "target only";
-  scene.robot = {.x = -0.33, .opening = 0.085};
+  scene.robot = physics_pool::planar_gripper({.x = -0.33, .opening = 0.085});
   scene.objects = {box("target", 0.0, 0.0)};
   scene.task.target = "target";
   return scene;
@@ -65,9 +65,9 @@ inline physics_pool::SceneObject slider(std::string name, double x, double y) {
 inline physics_pool::Scene push_ahead() {
   physics_pool::Scene scene;
   scene.name = "push ahead";
-  scene.surface.size = {1.0, 0.8};
+  scene.surface = physics_pool::Surface::table(1.0, 0.8);
   scene.objects = {slider("target", -0.2, 0.0)};
-  scene.robot = {.model = "pusher", .x = -0.2 - 0.05115 - 0.0145 - 0.01, .y = 0.0};
+  scene.robot = physics_pool::pusher({.x = -0.2 - 0.05115 - 0.0145 - 0.01, .y = 0.0});
   scene.task = {.kind = "push", .target = "target", .goal = {.x = 0.2, .y = 0.0, .radius = 0.04}};
   scene.physics.time_step = 0.001;
   return scene;

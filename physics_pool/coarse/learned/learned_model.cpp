@@ -95,9 +95,10 @@ bool is_near(double a, double b) { return std::abs(a - b) <= 1e-6; }  // m
 
 // Why a network does not fit a scene.
 std::optional<std::string> objection(const Network& network, const Scene& scene) {
-  if (!scene.robot.is_pusher()) return fmt::format("robot.model: got {}, wanted pusher", scene.robot.model);
-  if (!is_near(scene.robot.radius, network.bodies.pusher_radius)) {
-    return fmt::format("robot.radius: got {} m, wanted the {} m it was trained with", scene.robot.radius,
+  const auto radius = disc_radius(scene.robot.model);
+  if (!radius) return fmt::format("robot.model: got {}, wanted a disc, as the pusher is", scene.robot.model.name);
+  if (!is_near(*radius, network.bodies.pusher_radius)) {
+    return fmt::format("robot.radius: got {} m, wanted the {} m it was trained with", *radius,
                        network.bodies.pusher_radius);
   }
   if (scene.objects.empty() || scene.objects.size() > kSlots) {

@@ -12,6 +12,7 @@
 
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/local/thread_pool.hpp"
+#include "physics_pool/objective/scorer.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "services/common/process/files.hpp"
 #include "services/task/config/parameters.hpp"
@@ -107,7 +108,7 @@ Result<std::vector<RolloutOutcome>> samples(Pool& pool, const Task& task, const 
       .world = task.hash,
       .x0 = problem.x0,
       .nominal = problem.initial,
-      .u_before = std::vector<double>(kGripperAxes, 0.0),
+      .u_before = std::vector<double>(options.sigma.size(), 0.0),
       .step_duration = options.step_duration,
       .law = {.sigma = options.sigma, .limit = options.limit, .scales = options.scales, .seed = task.seed},
       .samples = study.samples,
@@ -161,7 +162,7 @@ bool succeeds(const Task& task, const Plan& plan, const planners::PbstoOptions& 
   }
   const physics_pool::TaskGeometry& geometry = task.world->geometry();
   return physics_pool::at_goal(geometry, world.state(), options.objective) &&
-         physics_pool::count_dropped(geometry, world.state(), options.objective.drop_height) == 0;
+         physics_pool::count_dropped(geometry, world.state(), options.objective.value("drop", "height")) == 0;
 }
 
 // Results by lever and size, made when first asked for.
@@ -463,7 +464,7 @@ Result<void> bench_cheap_physics(CheapPhysicsOptions options, const CheapPhysics
   if (!demo_result) return demo_result.error();
   const PbstoOptions& shipped = parameters_result->planner;
   options.levers = usual_levers(shipped);
-  options.control = parameters_result->control;
+  options.control = parameters_result->controller.control;
   options.demo = {*demo_result};
   physics_pool::ThreadPool pool(static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u)));
   auto results = measure_cheap_physics(pool, options, stop);

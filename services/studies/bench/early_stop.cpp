@@ -90,7 +90,7 @@ Result<Measurements> measure_early_stop(const Settings& settings) {
   if (auto loaded = pool.load(*scene_result); !loaded) return loaded.error();
   Planning planning{.pool = pool, .first = push(*scene_result, 6, 1.0, 8), .iterations = 6, .stop = settings.stop};
   // The thesis's nu = 0.008 read as a variance: wide enough that some are lost early.
-  planning.first.law.sigma[kControlX] = planning.first.law.sigma[kControlY] = 0.09;
+  planning.first.law.sigma[0] = planning.first.law.sigma[1] = 0.09;
 
   std::uint64_t steps_stopping = 0, steps_patient = 0;
   auto result = compare({"losers stopped", [&] { return time_plan(planning, true, steps_stopping); }},

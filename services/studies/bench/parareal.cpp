@@ -26,9 +26,8 @@ constexpr double kSpeed = 0.025;   // m/s
 Scene sliders_in_a_row(int sliders, const std::string& integrator) {
   Scene scene;
   scene.name = "parareal benchmark";
-  scene.surface.size = {4.0, 4.0};
-  scene.robot.model = "pusher";
-  scene.robot.x = -0.066;
+  scene.surface = Surface::table(4.0, 4.0);
+  scene.robot = pusher({.x = -0.066});
   for (int i = 0; i < sliders; ++i) {
     scene.objects.push_back({.name = fmt::format("slider{}", i),
                              .shape = Shape::kCylinder,
@@ -49,7 +48,7 @@ RolloutBatch straight_push(const Scene& scene, int steps) {
   RolloutBatch batch;
   batch.world = scene_hash(scene);
   batch.x0 = initial_state(scene);
-  batch.nominal.nu = kPusherAxes;
+  batch.nominal.nu = 2;
   for (int t = 0; t < steps; ++t) batch.nominal.append(std::vector{kSpeed, 0.0});
   batch.u_before = {0.0, 0.0};
   batch.step_duration = kDuration;

@@ -42,8 +42,9 @@ RolloutBatch push(const physics_pool::Scene& scene, int steps, double step_durat
   RolloutBatch batch;
   batch.world = physics_pool::scene_hash(scene);
   batch.x0 = physics_pool::initial_state(scene);
+  batch.nominal.nu = 4;
   for (int t = 0; t < steps; ++t) batch.nominal.append(std::vector{0.05, 0.0, 0.0, 0.0});
-  batch.u_before.assign(kGripperAxes, 0.0);
+  batch.u_before.assign(4, 0.0);
   batch.step_duration = step_duration;
   batch.law = {.sigma = {0.04, 0.04, 0.25, 0.004}, .limit = {0.15, 0.15, 0.8, 0.05}, .seed = 1};
   batch.samples = samples;

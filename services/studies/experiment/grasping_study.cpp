@@ -10,9 +10,11 @@
 
 #include "idl/text/yaml_fields.hpp"
 #include "physics_pool/local/thread_pool.hpp"
+#include "physics_pool/objective/scorer.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "physics_pool/uncertainty/belief.hpp"
 #include "services/common/process/files.hpp"
+#include "services/task/session/composition.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 
 namespace jostle::studies {
@@ -38,10 +40,12 @@ GraspingStudy read(yaml::Fields& fields, std::string& parameters) {
 
 double execution_cost(const physics_pool::TaskGeometry& geometry, const physics_pool::Objective& objective,
                       const Trajectory& states) {
-  const std::vector<double> still(kGripperAxes, 0.0);
-  double sum = physics_pool::final_cost(geometry, objective, states.back());
+  const std::vector<double> still(static_cast<std::size_t>(geometry.layout.nu), 0.0);
+  const physics_pool::Scorer scorer(objective);
+  double sum = scorer.final(geometry, states.back());
   for (std::size_t t = 0; t + 1 < states.size(); ++t) {
-    sum += physics_pool::running_cost(geometry, objective, still, still, states[t], states[t + 1]);
+    sum += scorer.running(
+        {.geometry = geometry, .u_before = still, .u = still, .x0 = states[t], .x1 = states[t + 1]});
   }
   return sum;
 }
@@ -55,33 +59,20 @@ Result<planners::Outcome> grasp(const GraspingStudy& study, const GraspingRun& r
   const Scene belief = physics_pool::perturb(scene, level, run.seed);
   auto truth_result = physics_pool::World::compile(scene);
   if (!truth_result) return truth_result.error();
-  auto believed_result = physics_pool::World::compile(belief);
-  if (!believed_result) return believed_result.error();
-  const physics_pool::WorldPtr believed = *believed_result;
-
   physics_pool::ThreadPool pool(1);
-  auto hash_result = pool.load(belief);
-  if (!hash_result) return hash_result.error();
+  auto run_result = task::Composition::make({.belief = belief,
+                                             .belief_is_exact = level == Uncertainty::kNone,
+                                             .parameters = study.parameters,
+                                             .controller = run.controller,
+                                             .seed = run.seed},
+                                            pool);
+  if (!run_result) return run_result.error();
   physics_pool::ExecutionWorld world(*truth_result, physics_pool::velocity_noise(level), run.seed);
   world::SimulatedRobot robot(world);
   world::SimulatedObjects objects(world, belief);
-  planners::Pbsto planner(pool, study.parameters.planner);
-  planners::ControlSetup setup{.planner = planner,
-                               .robot = robot,
-                               .objects = objects,
-                               .geometry = believed->geometry(),
-                               .objective = study.parameters.planner.objective,
-                               .world = *hash_result,
-                               .seed = run.seed};
-  if (level != Uncertainty::kNone) {
-    setup.make_feasible = [&believed](const State& x) { return physics_pool::separate(*believed, x); };
-  }
-  planners::ControlOptions options = study.parameters.control;
-  options.method =
-      run.controller == "or" ? planners::ControlOptions::Method::kOnline : planners::ControlOptions::Method::kNaive;
-  auto outcome_result = planners::run_controller(setup, options, {}, stop);
+  auto outcome_result = run_result->perform(robot, objects, {}, stop);
   if (outcome_result) {
-    cost = execution_cost(believed->geometry(), setup.objective, outcome_result->observed);
+    cost = execution_cost(run_result->geometry(), study.parameters.planner.objective, outcome_result->observed);
   }
   return outcome_result;
 }
@@ -131,9 +122,12 @@ Result<void> check(const GraspingStudy& study, const std::string& where) {
       return Error{Code::kInvalidArgument, fmt::format("{}levels: {}", where, ok.error().message)};
     }
   }
+  const auto scene_result = physics_pool::generate_chapter3({.objects = 0, .seed = 1});
+  if (!scene_result) return scene_result.error();
   for (const std::string& controller : study.controllers) {
-    if (controller == "or" || controller == "nr") continue;
-    return Error{Code::kInvalidArgument, fmt::format("{}controllers: got '{}', wanted or, nr", where, controller)};
+    if (auto ok = planners::find_controller(controller, *scene_result); !ok) {
+      return Error{Code::kInvalidArgument, fmt::format("{}controllers: {}", where, ok.error().message)};
+    }
   }
   return {};
 }
@@ -154,7 +148,7 @@ class GraspingStudyRunner final : public Study {
     if (options.seeds) std::tie(study.first_seed, study.last_seed) = *options.seeds;
     if (!options.levels.empty()) study.levels = options.levels;
     if (!options.controllers.empty()) study.controllers = options.controllers;
-    if (options.timeout) study.parameters.control.timeout = *options.timeout;
+    if (options.timeout) study.parameters.controller.set_timeout(*options.timeout);
     if (auto ok = check(study, "--"); !ok) return ok.error();
     const auto total = study.levels.size() * study.controllers.size() * (study.last_seed - study.first_seed + 1);
     std::size_t done = 0;

@@ -29,9 +29,8 @@ SceneObject slider(Shape shape, const std::string& name) {
 Scene scene_of(const PredictionStudy& study, Shape shape, int sliders) {
   Scene scene;
   scene.name = fmt::format("{} {}", sliders, shape == Shape::kBox ? "boxes" : "cylinders");
-  scene.surface.size = {4.0, 4.0};  // nothing falls here
-  scene.robot.model = "pusher";
-  scene.robot.x = -1.0;
+  scene.surface = physics_pool::Surface::table(4.0, 4.0);  // nothing falls here
+  scene.robot = physics_pool::pusher({.x = -1.0});
   for (int i = 0; i < sliders; ++i) {
     scene.objects.push_back(slider(shape, fmt::format("slider{}", i)));
     scene.objects.back().x = 0.5 * i;
@@ -46,7 +45,7 @@ RolloutBatch still_batch(const Scene& scene, double duration) {
   RolloutBatch batch;
   batch.world = physics_pool::scene_hash(scene);
   batch.x0 = physics_pool::initial_state(scene);
-  batch.nominal.nu = kPusherAxes;
+  batch.nominal.nu = 2;
   batch.u_before = {0.0, 0.0};
   batch.step_duration = duration;
   batch.law = {.sigma = {0.0, 0.0}, .limit = {1.0, 1.0}};
@@ -59,8 +58,9 @@ std::vector<double> velocity(double speed, double angle) { return {speed * std::
 // The pusher `across` metres beside the middle of the first slider's near side, touching it.
 void touch(const Scene& scene, double across, RolloutBatch& batch) {
   const SceneObject& object = scene.objects.front();
-  const double reach = object.radius + scene.robot.radius;
-  const double ahead = object.shape == Shape::kBox ? object.size[0] / 2 + scene.robot.radius
+  const double radius = *physics_pool::disc_radius(scene.robot.model);
+  const double reach = object.radius + radius;
+  const double ahead = object.shape == Shape::kBox ? object.size[0] / 2 + radius
                                                    : std::sqrt(std::max(reach * reach - across * across, 0.0));
   batch.x0.q[0] = object.x - ahead;
   batch.x0.q[1] = object.y + across;
@@ -118,9 +118,8 @@ RolloutBatch random_case(const PredictionStudy& study, const Scene& scene, int a
     const double from = random.uniform(-std::numbers::pi, std::numbers::pi);
     const SceneObject& target = drawn.objects[aim];
     const double reach = target.shape == Shape::kBox ? std::hypot(target.size[0], target.size[1]) / 2 : target.radius;
-    const double away = reach + drawn.robot.radius + random.uniform(0.001, 0.02);
-    drawn.robot.x = target.x + away * std::cos(from);
-    drawn.robot.y = target.y + away * std::sin(from);
+    const double away = reach + *physics_pool::disc_radius(drawn.robot.model) + random.uniform(0.001, 0.02);
+    drawn.robot.q = {target.x + away * std::cos(from), target.y + away * std::sin(from)};
     RolloutBatch batch = still_batch(scene, study.duration);
     batch.x0 = physics_pool::initial_state(drawn);
     const double heading = from + std::numbers::pi + random.normal(0.0, 0.4);

@@ -85,8 +85,7 @@ Scene located(const Scene& scene, const State& x) {
   const PlanarLayout at{static_cast<int>(scene.objects.size())};
   std::vector<double> planar(static_cast<std::size_t>(at.size()));
   physics_pool::to_planar(layout, x, planar);
-  result.robot.x = planar[0];
-  result.robot.y = planar[1];
+  result.robot.q = {planar[0], planar[1]};
   for (int i = 0; i < at.sliders; ++i) {
     auto& object = result.objects[static_cast<std::size_t>(i)];
     const auto pose = static_cast<std::size_t>(at.pose(i));

@@ -11,6 +11,7 @@
 #include "physics_pool/scenarios/push.hpp"
 #include "services/common/charts/statistics.hpp"
 #include "services/task/config/predictor.hpp"
+#include "services/task/session/composition.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 
 namespace jostle::studies {
@@ -31,31 +32,20 @@ Result<planners::Outcome> push(const PushStudy& study, const PushRun& run, std::
   const Scene belief = physics_pool::perturb(scene, study.reality, run.seed);
   auto truth_result = physics_pool::World::compile(scene);
   if (!truth_result) return truth_result.error();
-  auto believed_result = physics_pool::World::compile(belief);
-  if (!believed_result) return believed_result.error();
-  const physics_pool::WorldPtr believed = *believed_result;
-
   const PushStudy::Entry& entry = study.entries[run.entry];
   physics_pool::ThreadPool threads(entry.threads);
   auto predictor_result = task::Predictor::make(entry.predictor, threads);
   if (!predictor_result) return predictor_result.error();
-  auto hash_result = predictor_result->pool().load(belief);
-  if (!hash_result) return hash_result.error();
+  auto run_result = task::Composition::make({.belief = belief,
+                                             .belief_is_exact = study.reality == Uncertainty::kNone,
+                                             .parameters = study.parameters,
+                                             .seed = run.seed},
+                                            predictor_result->pool());
+  if (!run_result) return run_result.error();
   physics_pool::ExecutionWorld world(*truth_result, physics_pool::velocity_noise(study.reality), run.seed);
   world::SimulatedRobot robot(world);
   world::SimulatedObjects objects(world, belief);
-  planners::Pbsto planner(predictor_result->pool(), study.parameters.planner);
-  planners::ControlSetup setup{.planner = planner,
-                               .robot = robot,
-                               .objects = objects,
-                               .geometry = believed->geometry(),
-                               .objective = study.parameters.planner.objective,
-                               .world = *hash_result,
-                               .seed = run.seed};
-  if (study.reality != Uncertainty::kNone) {
-    setup.make_feasible = [&believed](const State& x) { return physics_pool::separate(*believed, x); };
-  }
-  return planners::run_mpc(setup, study.parameters.mpc, {}, stop);
+  return run_result->perform(robot, objects, {}, stop);
 }
 
 // Runs with one predictor.
@@ -94,7 +84,7 @@ StudyReport report(const PushStudy& study, const std::vector<PushRun>& runs) {
   const auto text = [](const common::Mean& mean, int digits) {
     return fmt::format("{:.{}f} ± {:.{}f}", mean.value, digits, mean.half_width, digits);
   };
-  const double step = study.parameters.mpc.step_duration;
+  const double step = study.parameters.controller.mpc.step_duration;
   const auto completion = [step](const PushRun& run) { return planning(run) + step * actions(run); };
   for (const Cell& cell : cells(study, runs)) {
     const common::Share share =
@@ -159,7 +149,7 @@ class PushStudyRunner final : public Study {
     }
     PushStudy study = study_;
     if (options.seeds) std::tie(study.first_seed, study.last_seed) = *options.seeds;
-    if (options.timeout) study.parameters.mpc.timeout = *options.timeout;
+    if (options.timeout) study.parameters.controller.set_timeout(*options.timeout);
     const std::size_t total = study.entries.size() * (study.last_seed - study.first_seed + 1);
     std::size_t done = 0;
     const auto runs = run_study(study, options, [&](const PushRun& run) {

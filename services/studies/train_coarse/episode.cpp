@@ -103,8 +103,8 @@ void guess_step(const DataOrigin& origin, Point& pusher, std::vector<Point>& sli
 physics_pool::Scene training_scene(const DataOrigin& origin, int sliders) {
   physics_pool::Scene scene;
   scene.name = fmt::format("{} sliders to learn from", sliders);
-  scene.surface.size = {2.0, 2.0};
-  scene.robot = {.model = "pusher", .x = -0.5, .radius = origin.pusher_radius, .height = origin.pusher_height};
+  scene.surface = physics_pool::Surface::table(2.0, 2.0);
+  scene.robot = physics_pool::pusher({.x = -0.5, .radius = origin.pusher_radius, .height = origin.pusher_height});
   for (int i = 0; i < sliders; ++i) {
     scene.objects.push_back({.name = fmt::format("slider_{}", i + 1),
                              .shape = physics_pool::Shape::kCylinder,
@@ -142,7 +142,7 @@ physics_pool::RolloutBatch draw_episode(const DataOrigin& origin, std::uint32_t 
   }
 
   double heading = 0.0;
-  batch.nominal.nu = kPusherAxes;
+  batch.nominal.nu = layout.nu;
   for (int t = 0; t < kEpisodeSteps; ++t) {
     const double speed = random.uniform(0.0, origin.max_speed * std::numbers::sqrt2);
     const double kind = random.uniform(0.0, 1.0);
@@ -157,7 +157,7 @@ physics_pool::RolloutBatch draw_episode(const DataOrigin& origin, std::uint32_t 
     batch.nominal.append(u);
     guess_step(origin, pusher, sliders, u);
   }
-  batch.u_before.assign(kPusherAxes, 0.0);
+  batch.u_before.assign(2, 0.0);
   batch.step_duration = origin.duration;
   const double limit = 2 * origin.max_speed;
   batch.law = {.sigma = {0.0, 0.0}, .limit = {limit, limit}};

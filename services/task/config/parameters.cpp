@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "idl/text/yaml_fields.hpp"
+#include "physics_pool/objective/catalogue.hpp"
 #include "services/common/process/files.hpp"
 
 namespace jostle::task {
@@ -11,12 +12,24 @@ namespace {
 using planners::ControlOptions;
 using planners::PbstoOptions;
 
+// Every kind of the catalogue by its name, every parameter as KIND_NAME; `angle` is what goal_angle was called.
+void read_objective(yaml::Fields& in, physics_pool::Objective& objective) {
+  for (const physics_pool::TermKind* kind : physics_pool::term_catalogue()) {
+    in.optional(kind->name, objective[kind->name].weight);
+    for (const physics_pool::TermParameter& parameter : kind->parameters) {
+      in.optional(fmt::format("{}_{}", kind->name, parameter.name).c_str(), objective.value(kind->name, parameter.name));
+    }
+  }
+  in.optional("angle", objective.value("goal", "angle"));
+  in.optional("success_cost", objective.success_cost);
+}
+
 // `timeout` is checked before it becomes a duration, s.
 Parameters read(const YAML::Node& root, const std::string& origin, double& timeout) {
   Parameters parameters;
   PbstoOptions& planner = parameters.planner;
-  ControlOptions& control = parameters.control;
-  planners::MpcOptions& mpc = parameters.mpc;
+  ControlOptions& control = parameters.controller.control;
+  planners::MpcOptions& mpc = parameters.controller.mpc;
   physics_pool::Objective& objective = planner.objective;
   yaml::Fields fields(root, "", origin);
   fields.optional("step_duration", planner.step_duration);
@@ -38,26 +51,7 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("screening_time_step", planner.screening_time_step);
   });
   fields.section("objective", false, [&](yaml::Fields& in) {
-    in.optional("goal", objective.goal);
-    in.optional("angle", objective.angle);
-    in.optional("acceleration", objective.acceleration);
-    in.optional("disturbance", objective.disturbance);
-    in.optional("disturbance_rotation", objective.disturbance_rotation);
-    in.optional("edge", objective.edge);
-    in.optional("edge_rate", objective.edge_rate);
-    in.optional("edge_exponent_max", objective.edge_exponent_max);
-    in.optional("edge_margin", objective.edge_margin);
-    in.optional("topple", objective.topple);
-    in.optional("topple_angle", objective.topple_angle);
-    in.optional("drop", objective.drop);
-    in.optional("drop_height", objective.drop_height);
-    in.optional("obstruction", objective.obstruction);
-    in.optional("obstacle_target", objective.obstacle_target);
-    in.optional("obstacle_pusher", objective.obstacle_pusher);
-    in.optional("obstacle_nearest", objective.obstacle_nearest);
-    in.optional("collision", objective.collision);
-    in.optional("intrusion", objective.intrusion);
-    in.optional("success_cost", objective.success_cost);
+    read_objective(in, objective);
   });
   fields.section("control", false, [&](yaml::Fields& in) {
     in.optional("many_iterations", control.many_iterations);
@@ -89,11 +83,11 @@ struct Range {
   double value, low, high;
 };
 
-// Weights are checked with every batch; this is what no batch carries.
+// What no batch carries, and the objective, which is better refused where it is written.
 Result<void> check(const Parameters& parameters, double timeout, const std::string& origin) {
   const PbstoOptions& planner = parameters.planner;
-  const ControlOptions& control = parameters.control;
-  const planners::MpcOptions& mpc = parameters.mpc;
+  const ControlOptions& control = parameters.controller.control;
+  const planners::MpcOptions& mpc = parameters.controller.mpc;
   for (const Range& range :
        {Range{"planner.rollouts", double(planner.rollouts), 1, physics_pool::kMaxSamples},
         Range{"planner.screening", double(planner.screening), 1, 1e4},
@@ -117,13 +111,14 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
     return Error{Code::kInvalidArgument,
                  fmt::format("{}: {}: got {}, wanted {} to {}", origin, range.key, range.value, range.low, range.high)};
   }
-  for (const auto& [key, values] : {std::pair{"sigma", &planner.sigma}, std::pair{"limit", &planner.limit}}) {
-    const std::size_t axes = values->size();
-    if (axes == planner.sigma.size() && (axes == kGripperAxes || axes == kPusherAxes)) continue;
+  if (planner.sigma.empty() || planner.sigma.size() != planner.limit.size()) {
     return Error{Code::kInvalidArgument,
-                 fmt::format("{}: planner.{}: got {} numbers, wanted {} for a gripper or {} for a pusher, of sigma "
-                             "and limit alike",
-                             origin, key, axes, int{kGripperAxes}, int{kPusherAxes})};
+                 fmt::format("{}: planner.sigma: got {} numbers and {} of planner.limit, wanted one of each for every axis "
+                             "of the robot",
+                             origin, planner.sigma.size(), planner.limit.size())};
+  }
+  if (auto ok = physics_pool::validate(planner.objective); !ok) {
+    return Error{ok.error().code, fmt::format("{}: {}", origin, ok.error().message)};
   }
   if (double(planner.rollouts) * planner.screening > physics_pool::kMaxSamples) {
     return Error{Code::kInvalidArgument,
@@ -147,7 +142,7 @@ Result<Parameters> parse_parameters(std::string_view text, const std::string& or
     double timeout = std::chrono::duration<double>(ControlOptions{}.timeout).count();
     Parameters parameters = read(root, origin, timeout);
     if (auto ok = check(parameters, timeout, origin); !ok) return ok.error();
-    parameters.control.timeout = parameters.mpc.timeout = std::chrono::milliseconds(std::llround(timeout * 1e3));
+    parameters.controller.set_timeout(std::chrono::milliseconds(std::llround(timeout * 1e3)));
     return parameters;
   });
 }
@@ -156,6 +151,16 @@ Result<Parameters> load_parameters(const std::filesystem::path& file) {
   auto text_result = common::read_text(file);
   if (!text_result) return text_result.error();
   return parse_parameters(*text_result, file.string());
+}
+
+Result<void> check_fit(const Parameters& parameters, const physics_pool::Scene& scene) {
+  const auto& axes = scene.robot.model.axes;
+  if (parameters.planner.sigma.size() == axes.size()) return {};
+  std::vector<std::string> names;
+  for (const physics_pool::Axis& axis : axes) names.push_back(axis.name);
+  return invalid("parameters: planner.sigma", fmt::format("{} numbers", parameters.planner.sigma.size()),
+                 fmt::format("{} for the robot '{}': {}; experiments/ has files for grasping and for pushing", axes.size(),
+                             scene.robot.model.name, fmt::join(names, ", ")));
 }
 
 }  // namespace jostle::task

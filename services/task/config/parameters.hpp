@@ -8,20 +8,22 @@
 #include <string_view>
 
 #include "idl/types/result.hpp"
-#include "planners/control/controller.hpp"
-#include "planners/mpc/mpc.hpp"
+#include "planners/controllers/catalogue.hpp"
 #include "planners/pbsto/pbsto.hpp"
 
 namespace jostle::task {
 
 struct Parameters {
   planners::PbstoOptions planner;
-  planners::ControlOptions control;  ///< grasping
-  planners::MpcOptions mpc;          ///< pushing
+  planners::ControllerOptions controller;
 };
 
 /// Keys that a file leaves out keep their defaults; unknown keys are refused.
 Result<Parameters> parse_parameters(std::string_view yaml, const std::string& origin);
 Result<Parameters> load_parameters(const std::filesystem::path& file);
+
+/// Whether parameters have numbers for every axis of a scene's robot.
+/// Error kInvalidArgument naming the axes.
+Result<void> check_fit(const Parameters& parameters, const physics_pool::Scene& scene);
 
 }  // namespace jostle::task

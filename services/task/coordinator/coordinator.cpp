@@ -187,7 +187,7 @@ void Coordinator::note(const planners::ControlEvent& event, const physics_pool::
   feedback_.replans(event.replans);
   if (event.phase == planners::Phase::kPlanning) rollouts_before_ = feedback_.rollouts();
   if (event.observed && !event.observed->q.empty()) {
-    feedback_.target_distance(physics_pool::goal_distance(geometry, *event.observed));
+    feedback_.target_distance(geometry.kind->distance(geometry, *event.observed));
   }
 }
 
@@ -197,7 +197,7 @@ void Coordinator::note(const planners::Progress& progress, const physics_pool::T
   feedback_.cost(progress.cost);
   feedback_.rollouts(rollouts_before_ + progress.rollouts);
   if (progress.final_state) {
-    feedback_.target_distance(physics_pool::goal_distance(geometry, *progress.final_state));
+    feedback_.target_distance(geometry.kind->distance(geometry, *progress.final_state));
   }
 }
 

@@ -32,23 +32,21 @@ Result<void> complete(const Arguments& arguments, RunOptions& options) {
   if (!scene_result) return scene_result.error();
   options.scene = std::move(scene_result).value();
   options.planning = physics_pool::perturb(options.scene, options.level, options.seed);
-  const bool push = options.scene.task.is_push();
-  if (options.controller.empty()) options.controller = push ? "mpc" : "or";
-  if (push != (options.controller == "mpc")) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("--controller: got {} for a task to {}, wanted {}", options.controller,
-                             options.scene.task.kind, push ? "mpc" : "or, nr")};
-  }
+  const auto controller_result = planners::find_controller(options.controller, options.planning);
+  if (!controller_result) return Error{controller_result.error().code, "--" + controller_result.error().message};
+  const planners::ControllerKind* kind = *controller_result;
+  options.controller = kind->name;
   if (auto ok = Predictor::check(options.predictor, options.planning); !ok)
     return Error{ok.error().code, "--" + ok.error().message};
   const std::filesystem::path file =
-      arguments.parameters.empty() ? common::data_file(push ? "experiments/pushing.yaml" : "experiments/grasping.yaml")
+      arguments.parameters.empty() ? common::data_file(kind->parameters)
                                    : std::filesystem::path(arguments.parameters);
   auto parameters_result = common::read_text(file);
   if (!parameters_result) return parameters_result.error();
   options.parameters = std::move(parameters_result).value();
-  if (auto ok = parse_parameters(options.parameters, file.string()); !ok) return ok.error();
-  return {};
+  const auto parsed_result = parse_parameters(options.parameters, file.string());
+  if (!parsed_result) return parsed_result.error();
+  return check_fit(*parsed_result, options.planning);
 }
 
 int fail(const Error& error, int code) {
@@ -95,8 +93,7 @@ int main(int argc, char** argv) {
   app.add_flag("--pin", pin, "Give each worker process a core of its own, in turn");
   app.add_option("--controller", options.controller,
                  "To grasp, or: online re-planning (default), nr: naive "
-                 "re-planning; to push, mpc: model-predictive control (default)")
-      ->check(CLI::IsMember({"or", "nr", "mpc"}));
+                 "re-planning; to push, mpc: model-predictive control (default)");
   app.add_option(
          "--predictor", options.predictor,
          "What plans of pushes are made with: fine, coarse[,MODEL], parareal:K[,MODEL][,split] or\n"

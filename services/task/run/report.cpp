@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "physics_pool/scene/task_kind.hpp"
 #include "services/common/process/child_process.hpp"
 #include "services/common/process/files.hpp"
 
@@ -24,7 +25,7 @@ json frames_of(const json& states, const RunOptions& options, const json& report
     const std::size_t at = shown == 1 ? 0 : i * (count - 1) / (shown - 1);
     std::string caption = fmt::format("{}t = {} s", options.plan_only ? "plan, " : "", at);
     if (at + 1 == count && !options.plan_only) {
-      caption += success ? options.scene.task.is_push() ? "  (at the goal)" : "  (grasped)"
+      caption += success ? fmt::format("  ({})", physics_pool::find_task_kind(options.scene.task.kind)->achieved)
                          : fmt::format("  ({})", report["reason"].get<std::string>());
     }
     frames.push_back({{"caption", caption}, {"q", states[at]}});

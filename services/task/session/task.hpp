@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Task: a goal made ready to be performed, on any robot and with any pool.
+/// Task: a goal as it came over the wire, made ready to be performed and recorded.
 
 #include <functional>
 #include <memory>
@@ -8,15 +8,13 @@
 #include <string>
 
 #include "idl/msg/task.h"
-#include "physics_pool/local/world.hpp"
-#include "planners/control/controller.hpp"
-#include "services/task/config/parameters.hpp"
 #include "services/task/config/predictor.hpp"
+#include "services/task/session/composition.hpp"
 #include "services/task/session/journal.hpp"
 
 namespace jostle::task {
 
-/// Everything a goal's texts say, checked.
+/// Everything a goal's texts say, checked, and the run composed of it.
 ///
 /// Threads  one.
 /// Repeats  equal goals and equal observations make bit-equal decisions on any pool.
@@ -41,21 +39,16 @@ class Task {
                                     std::stop_token stop);
 
   const physics_pool::Scene& execution_scene() const { return execution_; }
-  /// Of the planning scene.
-  const physics_pool::TaskGeometry& geometry() const { return believed_->geometry(); }
-  Parameters& parameters() { return parameters_; }
+  const physics_pool::TaskGeometry& geometry() const { return run_.geometry(); }  ///< of the planning scene
+  Parameters& parameters() { return run_.parameters(); }
 
  private:
-  Task(const jostle_msgs::msg::Goal& goal, physics_pool::Scene execution, physics_pool::WorldPtr believed,
-       Parameters parameters, Predictor predictor, Hash world);
+  Task(std::string goal_id, physics_pool::Scene execution, Predictor predictor, Composition run);
 
   std::string goal_id_;
-  std::uint64_t seed_;
   physics_pool::Scene execution_;
-  physics_pool::WorldPtr believed_;  // the planning scene
-  Parameters parameters_;
   Predictor predictor_;  // what stands between the pool and the planner
-  Hash world_;           // planning world, known to the predictor
+  Composition run_;
 };
 
 /// A goal that is taken up now, by this build on this machine.

@@ -1,14 +1,17 @@
 // jostle scene: makes, checks, disturbs and shows scene files.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <optional>
 
+#include "physics_pool/robot/kinematics.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "physics_pool/scenarios/push.hpp"
 #include "physics_pool/scene/scene.hpp"
+#include "physics_pool/scene/task_kind.hpp"
 #include "physics_pool/uncertainty/belief.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
@@ -59,7 +62,7 @@ Result<Scene> make_scene(Arguments arguments) {
 Result<void> generate(const Arguments& arguments) {
   auto scene_result = make_scene(arguments);
   if (!scene_result) return scene_result.error();
-  return write(arguments.output, to_yaml(*scene_result));
+  return write(arguments.output, to_yaml(*scene_result, physics_pool::RobotText::kByName));
 }
 
 Result<void> check(const Arguments& arguments) {
@@ -74,7 +77,7 @@ Result<void> perturb(const Arguments& arguments) {
   if (!level_result) return level_result.error();
   const auto scene_result = physics_pool::load_scene(arguments.input);
   if (!scene_result) return scene_result.error();
-  return write(arguments.output, to_yaml(physics_pool::perturb(*scene_result, *level_result, arguments.seed)));
+  return write(arguments.output, to_yaml(physics_pool::perturb(*scene_result, *level_result, arguments.seed), physics_pool::RobotText::kByName));
 }
 
 std::string size_text(const SceneObject& object) {
@@ -89,10 +92,16 @@ Result<void> show(const Arguments& arguments) {
   if (!scene_result) return scene_result.error();
   const Scene& scene = *scene_result;
   fmt::print("{}  {}\n", scene.name, to_string(scene_hash(scene)));
-  fmt::print("{} {} x {} m, {} at x {:.3f}, y {:.3f} m, time step {} s, {} '{}'\n\n",
-             scene.surface.kind == physics_pool::Surface::Kind::kTable ? "table" : "shelf", scene.surface.size[0],
-             scene.surface.size[1], scene.robot.model, scene.robot.x, scene.robot.y, scene.physics.time_step,
-             scene.task.kind, scene.task.target);
+  const physics_pool::Rectangle bounds = scene.surface.bounds();
+  const Eigen::Vector3d tool =
+      physics_pool::tool_pose(scene.robot.model, transform(scene.robot.base), scene.robot.q).translation();
+  fmt::print("surface {} x {} m{}, {} at x {:.3f}, y {:.3f}, z {:.3f} m, time step {} s, {} '{}'\n", bounds.size[0],
+             bounds.size[1], scene.surface.parts.size() > 1 ? fmt::format(" in {} parts", scene.surface.parts.size()) : "",
+             scene.robot.model.name, tool.x(), tool.y(), tool.z(), scene.physics.time_step, scene.task.kind,
+             scene.task.target);
+  std::vector<std::string> axes;
+  for (const physics_pool::Axis& axis : scene.robot.model.axes) axes.push_back(axis.name);
+  fmt::print("robot: {} joints, controls {}\n\n", scene.robot.model.joints.size(), fmt::join(axes, ", "));
   const auto show_disc = [](const char* name, const physics_pool::Disc& disc) {
     fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", name, "disc",
                fmt::format("r {:.1f}", 1e3 * disc.radius), "", "", disc.x, disc.y);
@@ -104,7 +113,14 @@ Result<void> show(const Arguments& arguments) {
                object.shape == physics_pool::Shape::kBox ? "box" : "cylinder", size_text(object), object.mass,
                object.friction, object.x, object.y, object.yaw);
   }
-  if (scene.task.is_push()) show_disc("(goal)", scene.task.goal);
+  for (const physics_pool::Fixture& fixture : scene.fixtures) {
+    const bool box = fixture.shape == physics_pool::Shape::kBox;
+    fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", fixture.name, box ? "box" : "cylinder",
+               box ? fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * fixture.size[0], 1e3 * fixture.size[1], 1e3 * fixture.size[2])
+                   : fmt::format("r {:.1f}, h {:.1f}", 1e3 * fixture.radius, 1e3 * fixture.height),
+               "fixed", "", fixture.pose.position[0], fixture.pose.position[1]);
+  }
+  if (physics_pool::find_task_kind(scene.task.kind)->has_goal) show_disc("(goal)", scene.task.goal);
   if (scene.task.obstacle) show_disc("(obstacle)", *scene.task.obstacle);
   return {};
 }

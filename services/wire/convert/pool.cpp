@@ -9,58 +9,27 @@ namespace {
 
 namespace msg = jostle_msgs::msg;
 using physics_pool::End;
-using physics_pool::Objective;
 using physics_pool::RolloutBatch;
 using physics_pool::RolloutOutcome;
 
+constexpr std::uint8_t kHitFixture = 1;  // of TaskResult::facts
 constexpr std::int64_t kSimulate = -1;  // of BatchDescription::wait
 
-msg::ObjectiveWeights to_wire(const Objective& objective) {
-  msg::ObjectiveWeights wire;
-  wire.goal(objective.goal);
-  wire.angle(objective.angle);
-  wire.acceleration(objective.acceleration);
-  wire.disturbance(objective.disturbance);
-  wire.disturbance_rotation(objective.disturbance_rotation);
-  wire.edge(objective.edge);
-  wire.edge_rate(objective.edge_rate);
-  wire.edge_exponent_max(objective.edge_exponent_max);
-  wire.edge_margin(objective.edge_margin);
-  wire.topple(objective.topple);
-  wire.topple_angle(objective.topple_angle);
-  wire.drop(objective.drop);
-  wire.drop_height(objective.drop_height);
-  wire.obstruction(objective.obstruction);
-  wire.obstacle_target(objective.obstacle_target);
-  wire.obstacle_pusher(objective.obstacle_pusher);
-  wire.obstacle_nearest(objective.obstacle_nearest);
-  wire.collision(objective.collision);
-  wire.intrusion(objective.intrusion);
-  wire.success_cost(objective.success_cost);
+std::vector<msg::Term> to_wire(const std::vector<physics_pool::Term>& terms) {
+  std::vector<msg::Term> wire;
+  for (const physics_pool::Term& term : terms) {
+    msg::Term& one = wire.emplace_back();
+    one.kind(term.kind);
+    one.weight(term.weight);
+    one.values(term.values);
+  }
   return wire;
 }
 
-Objective from_wire(const msg::ObjectiveWeights& wire) {
-  return {.goal = wire.goal(),
-          .angle = wire.angle(),
-          .acceleration = wire.acceleration(),
-          .disturbance = wire.disturbance(),
-          .disturbance_rotation = wire.disturbance_rotation(),
-          .edge = wire.edge(),
-          .edge_rate = wire.edge_rate(),
-          .edge_exponent_max = wire.edge_exponent_max(),
-          .edge_margin = wire.edge_margin(),
-          .topple = wire.topple(),
-          .topple_angle = wire.topple_angle(),
-          .drop = wire.drop(),
-          .drop_height = wire.drop_height(),
-          .obstruction = wire.obstruction(),
-          .obstacle_target = wire.obstacle_target(),
-          .obstacle_pusher = wire.obstacle_pusher(),
-          .obstacle_nearest = wire.obstacle_nearest(),
-          .collision = wire.collision(),
-          .intrusion = wire.intrusion(),
-          .success_cost = wire.success_cost()};
+std::vector<physics_pool::Term> from_wire(const std::vector<msg::Term>& wire) {
+  std::vector<physics_pool::Term> terms;
+  for (const msg::Term& term : wire) terms.push_back({.kind = term.kind(), .weight = term.weight(), .values = term.values()});
+  return terms;
 }
 
 Error wrong(const char* field, const std::string& got, const std::string& wanted) {
@@ -111,7 +80,8 @@ msg::BatchDescription to_wire(const RolloutBatch& batch) {
   wire.draws(batch.law.draws);
   wire.first_sample(batch.first_sample);
   wire.samples(batch.samples);
-  wire.objective(to_wire(batch.objective));
+  wire.terms(to_wire(batch.objective.terms));
+  wire.success_cost(batch.objective.success_cost);
   wire.incumbent(batch.incumbent);
   wire.stop_losers(batch.stop_losers);
   wire.stop_hopeless(batch.stop_hopeless);
@@ -141,7 +111,7 @@ RolloutBatch from_wire(const msg::BatchDescription& wire) {
                .draws = wire.draws()};
   batch.first_sample = wire.first_sample();
   batch.samples = wire.samples();
-  batch.objective = from_wire(wire.objective());
+  batch.objective = {.terms = from_wire(wire.terms()), .success_cost = wire.success_cost()};
   batch.incumbent = wire.incumbent();
   batch.stop_losers = wire.stop_losers();
   batch.stop_hopeless = wire.stop_hopeless();
@@ -164,6 +134,7 @@ msg::TaskResult to_wire(const RolloutOutcome& outcome) {
   wire.thawed(outcome.thawed);
   wire.at_goal(outcome.at_goal);
   wire.step_costs(outcome.step_costs);
+  for (const physics_pool::StepFacts& facts : outcome.facts) wire.facts().push_back(facts.robot_hit_fixture ? kHitFixture : 0);
   wire.reason(outcome.reason);
   if (!outcome.trajectory.empty()) {
     wire.nq(static_cast<std::uint32_t>(outcome.trajectory.front().q.size()));
@@ -190,6 +161,11 @@ Result<RolloutOutcome> from_wire(const msg::TaskResult& wire) {
     return wrong("step_costs", fmt::format("{} values", wire.step_costs().size()),
                  fmt::format("steps = {}", wire.steps()));
   }
+  if (wire.facts().size() != wire.steps()) {
+    return wrong("facts", fmt::format("{} values", wire.facts().size()), fmt::format("steps = {}", wire.steps()));
+  }
+  std::vector<physics_pool::StepFacts> facts;
+  for (const std::uint8_t bits : wire.facts()) facts.push_back({.robot_hit_fixture = (bits & kHitFixture) != 0});
   auto trajectory_result = trajectory_from_wire(wire);
   if (!trajectory_result) return trajectory_result.error();
   return RolloutOutcome{.sample = wire.sample(),
@@ -200,6 +176,7 @@ Result<RolloutOutcome> from_wire(const msg::TaskResult& wire) {
                         .thawed = wire.thawed(),
                         .at_goal = wire.at_goal(),
                         .step_costs = wire.step_costs(),
+                        .facts = std::move(facts),
                         .trajectory = std::move(trajectory_result).value(),
                         .reason = wire.reason()};
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics_pool/objective/scorer.hpp"
 #include "robot_bridge/safety/command_check.hpp"
 
 namespace jostle::world {
@@ -29,11 +30,11 @@ Result<robot_bridge::RobotReading> SimulatedRobot::read() {
   return robot_bridge::RobotReading{
       .q = {x.q.begin(), x.q.begin() + joints},
       .v = {x.v.begin(), x.v.begin() + joints},
-      .object_in_hand = geometry.task.is_push() ? std::nullopt : std::optional(physics_pool::at_goal(geometry, x, {}))};
+      .object_in_hand = geometry.robot.hand ? std::optional(physics_pool::at_goal(geometry, x, {})) : std::nullopt};
 }
 
 Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {
-  if (auto ok = robot_bridge::check_command(u, world_.world().geometry().layout.nu, duration); !ok) return ok;
+  if (auto ok = robot_bridge::check_command(u, physics_pool::axis_limits(world_.world().scene().robot.model), duration); !ok) return ok;
   world_.begin(u);
   const long steps = std::lround(duration / world_.world().time_step());
   for (long i = 0; i < steps; ++i) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <thread>
 
+#include "physics_pool/objective/scorer.hpp"
 #include "robot_bridge/safety/command_check.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 #include "services/world/link/messages.hpp"
@@ -60,7 +61,7 @@ void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
     return;
   }
   const auto check_result =
-      robot_bridge::check_command(command.velocities(), world_.world().geometry().layout.nu, command.duration());
+      robot_bridge::check_command(command.velocities(), physics_pool::axis_limits(world_.world().scene().robot.model), command.duration());
   if (!check_result && command.epoch() > epoch_) {  // the present commander must not suffer for it
     spdlog::warn("command {}/{} of a newcomer: {}; refused", command.epoch(), command.sequence_number(),
                  check_result.error().message);
@@ -143,7 +144,7 @@ void SimulatedWorld::publish() {
   status.epoch(epoch_);
   status.sequence_number(finished_);
   status.busy(busy_ || !actions_.empty());
-  status.object_in_hand(!geometry.task.is_push() && physics_pool::at_goal(geometry, truth, {}));
+  status.object_in_hand(geometry.robot.hand && physics_pool::at_goal(geometry, truth, {}));
   status.error(error_);
   status.q(joints.position());
   status.v(joints.velocity());

@@ -93,7 +93,7 @@ Result<void> RobotClient::wait_for_robot(std::stop_token stop) {
 }
 
 Result<void> RobotClient::execute(std::span<const double> u, double duration, std::stop_token stop) {
-  if (auto ok = robot_bridge::check_command(u, static_cast<int>(u.size()), duration); !ok) return ok;
+  if (auto ok = robot_bridge::check_command(u, std::vector<double>(u.size(), robot_bridge::kAnySpeed), duration); !ok) return ok;
   if (auto ok = wait_for_robot(stop); !ok) return ok;
   jostle_msgs::msg::VelocityCommand command;
   command.header(make_header(time_));

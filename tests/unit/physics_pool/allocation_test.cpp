@@ -10,6 +10,7 @@
 #include "physics_pool/local/reduced_simulator.hpp"
 #include "physics_pool/local/simulator.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/costs.hpp"
 
 namespace {
 
@@ -32,6 +33,8 @@ void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); 
 
 namespace jostle::physics_pool {
 namespace {
+
+using namespace tests;
 
 void* counted_by_engine(std::size_t size) { return counted(size); }
 
@@ -58,7 +61,7 @@ TEST_F(AllocationTest, CounterSeesBothKinds) {
 
 TEST_F(AllocationTest, AdvanceAllocatesNothingAfterConstruction) {
   Scene scene = tests::three_objects();
-  scene.robot.x = -0.15;
+  scene.robot.q[0] = -0.15;
   const WorldPtr world = std::move(World::compile(scene)).value();
   Simulator sut(world);
   const State start = initial_state(scene);
@@ -72,7 +75,7 @@ TEST_F(AllocationTest, AdvanceAllocatesNothingAfterConstruction) {
 
 TEST_F(AllocationTest, AdvanceWithFrozenObjectsAllocatesNothingOnceItsModelsExist) {
   Scene scene = tests::three_objects();
-  scene.robot.x = -0.15;
+  scene.robot.q[0] = -0.15;
   const WorldPtr world = std::move(World::compile(scene)).value();
   ReducedSimulator sut(world, {.freeze = true});
   const std::array<double, 4> u{0.1, 0.0, 0.2, 0.0};
@@ -108,9 +111,9 @@ TEST_F(AllocationTest, ScoringAStepAllocatesNothing) {
   State b = a;
   b.q[6] += 0.3;
   const std::array<double, 4> u{0.1, 0, 0, 0}, none{};
-  const Objective objective;
+  const Objective objective = Objective::standard();
   const long before = allocations;
-  const double cost = running_cost(geometry, objective, none, u, a, b) + goal_cost(geometry, b, objective.angle) +
+  const double cost = tests::running_cost(geometry, objective, none, u, a, b) + tests::goal_cost(geometry, b, objective.value("goal", "angle")) +
                       at_goal(geometry, b, objective);
   EXPECT_EQ(allocations, before);
   EXPECT_GT(cost, 0.0);

@@ -8,14 +8,17 @@
 #include "physics_pool/local/simulator.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/costs.hpp"
 
 namespace jostle::physics_pool {
 namespace {
 
+using namespace tests;
+
 const std::vector<double> kNone{0, 0, 0, 0};
 
 ControlSequence constant(const std::vector<double>& u, int steps) {
-  ControlSequence controls;
+  ControlSequence controls{.nu = kGripperControls};
   for (int t = 0; t < steps; ++t) controls.append(u);
   return controls;
 }
@@ -30,19 +33,19 @@ class OutlookTest : public testing::Test {
   const Scene scene = tests::target_only();
   const TaskGeometry geometry{scene};
   State x = initial_state(scene);  // the target 0.33 m ahead
-  Objective objective;
+  Objective objective = Objective::standard();
 };
 
 TEST_F(OutlookTest, StandingStillPaysForTheWholeDistance) {
   const Outlook sut = of(constant(kNone, 3));
-  EXPECT_NEAR(sut.cost, objective.goal * 0.325 * 0.325, 1e-9);  // 5 mm of slack
+  EXPECT_NEAR(sut.cost, objective.weight("goal") * 0.325 * 0.325, 1e-9);  // 5 mm of slack
   EXPECT_FALSE(sut.may_succeed);
 }
 
 TEST_F(OutlookTest, TwoMetresPerMetreOfTheHandAtMost) {
   const Outlook sut = of(constant({0.03, 0.04, 0.0, 0.0}, 2));
-  const double changes = objective.acceleration * 0.05 * 0.05;
-  EXPECT_NEAR(sut.cost, changes + objective.goal * std::pow(0.325 - 2 * 0.05 * 2, 2), 1e-9);
+  const double changes = objective.weight("acceleration") * 0.05 * 0.05;
+  EXPECT_NEAR(sut.cost, changes + objective.weight("goal") * std::pow(0.325 - 2 * 0.05 * 2, 2), 1e-9);
 }
 
 TEST_F(OutlookTest, NothingIsCertainOfAHandThatCanArrive) {
@@ -54,7 +57,7 @@ TEST_F(OutlookTest, NothingIsCertainOfAHandThatCanArrive) {
 TEST_F(OutlookTest, WhatHasDroppedIsPaidForInEveryStepToCome) {
   x.q[static_cast<std::size_t>(geometry.layout.objects[0].q) + 2] = -0.3;
   const Outlook sut = of(constant({0.15, 0.0, 0.0, 0.0}, 6), 2);
-  EXPECT_GE(sut.cost, 4 * objective.drop);
+  EXPECT_GE(sut.cost, 4 * objective.weight("drop"));
 }
 
 // Against physics: no rollout, whatever it pushes, beats what was foretold of it.

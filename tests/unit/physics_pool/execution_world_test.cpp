@@ -5,15 +5,18 @@
 #include <cmath>
 
 #include "tests/support/scenes.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::physics_pool {
 namespace {
+
+using namespace tests;
 
 constexpr int kSteps = 250;  // half a second
 
 WorldPtr compiled() {
   Scene scene = tests::three_objects();
-  scene.robot.x = -0.15;
+  scene.robot.q[0] = -0.15;
   return std::move(World::compile(scene)).value();
 }
 
@@ -51,7 +54,7 @@ TEST(ExecutionWorld, RepeatsForEqualSeedsAndDiffersForOthers) {
 // Eq. 3.3: a robot at rest has, after one step, a velocity of one draw.
 TEST(ExecutionWorld, AddsVelocityNoiseOfTheGivenSigmaEveryStep) {
   Scene scene = tests::target_only();
-  scene.robot = {.x = -0.8};
+  scene.robot = physics_pool::planar_gripper({.x = -0.8});
   const WorldPtr world = std::move(World::compile(scene)).value();
   constexpr double kSigma = 0.01;
   constexpr int kRuns = 400;

@@ -64,11 +64,11 @@ TEST_P(GeneratePush, GivesValidScenesThatReadBack) {
 TEST_P(GeneratePush, PutsThePusherStraightBehindTheTarget) {
   for (const Scene& scene : all_chapter6()) {
     const SceneObject& target = target_of(scene);
-    const double gap = signed_distance(target, {.x = scene.robot.x, .y = scene.robot.y, .radius = scene.robot.radius});
+    const double gap = signed_distance(target, {.x = scene.robot.q[0], .y = scene.robot.q[1], .radius = *disc_radius(scene.robot.model)});
     EXPECT_GE(gap, 0.01 - 1e-6);
     EXPECT_LE(gap, 0.02 + 1e-6);
-    EXPECT_NEAR(off_the_way(scene, scene.robot.x, scene.robot.y), 0.0, 1e-12);
-    EXPECT_LT((scene.robot.x - target.x) * (scene.task.goal.x - target.x), 0.0);
+    EXPECT_NEAR(off_the_way(scene, scene.robot.q[0], scene.robot.q[1]), 0.0, 1e-12);
+    EXPECT_LT((scene.robot.q[0] - target.x) * (scene.task.goal.x - target.x), 0.0);
   }
 }
 
@@ -99,7 +99,7 @@ TEST_P(GeneratePush, LeavesRoomToGoRound) {
     const Disc& obstacle = *scene.task.obstacle;
     EXPECT_LE(off_the_way(scene, obstacle.x, obstacle.y), 0.02 + 1e-9);
     const double reach = obstacle.radius + (GetParam() == Shape::kBox ? 0.0945 : 0.05115);
-    EXPECT_LT(std::abs(obstacle.y) + reach + 0.05, scene.surface.size[1] / 2);
+    EXPECT_LT(std::abs(obstacle.y) + reach + 0.05, scene.surface.parts[0].size[1] / 2);
   }
 }
 
@@ -140,8 +140,8 @@ INSTANTIATE_TEST_SUITE_P(Shapes, GeneratePush, testing::Values(Shape::kCylinder,
 
 TEST(GenerateChapter6, HasTheMeasuresOfTheAuthorsCode) {
   const Scene round = generated(generate_chapter6({}));
-  EXPECT_EQ(round.robot.radius, 0.0145);
-  EXPECT_EQ(round.robot.height, 0.11);
+  EXPECT_EQ(*disc_radius(round.robot.model), 0.0145);
+  EXPECT_EQ(round.robot.model.links[0].geoms[0].height, 0.11);
   EXPECT_EQ(round.objects[0].radius, 0.05115);
   EXPECT_EQ(round.objects[0].height, 0.0245);
   EXPECT_EQ(round.objects[0].mass, 0.5);

@@ -92,8 +92,8 @@ TEST(GenerateChapter3, KeepsItsDistanceFromTheEdge) {
     const GenerateOptions options{.objects = 15, .seed = seed};
     const Scene scene = generated(options);
     for (const SceneObject& object : scene.objects) {
-      EXPECT_LE(std::abs(object.x), scene.surface.size[0] / 2 - options.edge_distance);
-      EXPECT_LE(std::abs(object.y), scene.surface.size[1] / 2 - options.edge_distance);
+      EXPECT_LE(std::abs(object.x), scene.surface.parts[0].size[0] / 2 - options.edge_distance);
+      EXPECT_LE(std::abs(object.y), scene.surface.parts[0].size[1] / 2 - options.edge_distance);
     }
   }
 }
@@ -116,9 +116,9 @@ TEST(GenerateChapter3, PutsTheTargetNearTheCentre) {
 
 TEST(GenerateChapter3, MakesATableOf60CmWithTheRobotOutside) {
   const Scene scene = generated({.objects = 15, .seed = 1});
-  EXPECT_EQ(scene.surface.kind, Surface::Kind::kTable);
-  EXPECT_EQ(scene.surface.size, (std::array{0.6, 0.6}));
-  EXPECT_EQ(scene.robot.model, "planar_gripper");
+  EXPECT_EQ(scene.surface, Surface::table(0.6, 0.6));
+  EXPECT_TRUE(scene.fixtures.empty());
+  EXPECT_EQ(scene.robot.model.name, "planar_gripper");
 }
 
 TEST(GenerateChapter3, RepeatsForEqualSeedsAndDiffersForOthers) {
@@ -147,10 +147,10 @@ TEST_P(GenerateCount, GivesThatManyObjects) {
 INSTANTIATE_TEST_SUITE_P(Counts, GenerateCount, testing::Values(0, 1, 15, 25, 40));
 
 TEST(GenerateChapter3, KeepsTheDensityOfTheThesisForMoreObjects) {
-  EXPECT_EQ(generated({.objects = 5}).surface.size[0], 0.6);
-  EXPECT_NEAR(generated({.objects = 40}).surface.size[0], 0.6 * std::sqrt(40.0 / 15.0), 1e-12);
-  EXPECT_EQ(generated({.objects = 5, .table = 0.8}).surface.size, (std::array{0.8, 0.8}));
-  EXPECT_EQ(generated({.objects = 5}).robot.x, -0.33);
+  EXPECT_EQ(generated({.objects = 5}).surface.parts[0].size[0], 0.6);
+  EXPECT_NEAR(generated({.objects = 40}).surface.parts[0].size[0], 0.6 * std::sqrt(40.0 / 15.0), 1e-12);
+  EXPECT_EQ(generated({.objects = 5, .table = 0.8}).surface.parts[0].size, (std::array{0.8, 0.8}));
+  EXPECT_EQ(generated({.objects = 5}).robot.q[kJointX], -0.33);
 }
 
 TEST(GenerateChapter3, SaysWhenThereIsNoRoomLeft) {

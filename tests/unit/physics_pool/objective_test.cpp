@@ -6,13 +6,14 @@
 #include <numbers>
 
 #include "physics_pool/sampling/counter_rng.hpp"
-#include "physics_pool/scene/planar_gripper.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/planar.hpp"
+#include "tests/support/costs.hpp"
 
 namespace jostle::physics_pool {
 namespace {
 
-namespace hand = planar_gripper;
+using namespace tests;
 using std::numbers::pi;
 
 class ObjectiveTerms : public testing::Test {
@@ -48,7 +49,7 @@ class ObjectiveTerms : public testing::Test {
 
   const Scene scene = tests::three_objects();  // target, can, carton
   const TaskGeometry geometry{scene};
-  const Objective objective;
+  const Objective objective = Objective::standard();
   State start = initial_state(scene);
 };
 
@@ -67,7 +68,7 @@ TEST_F(ObjectiveTerms, GoalDistanceAndAngleFollowTheHand) {
       const TargetBearing bearing = target_bearing(geometry, start);
       EXPECT_NEAR(bearing.distance, 0.05, 1e-12);
       EXPECT_NEAR(bearing.angle, std::atan2(0.03, 0.04), 1e-9);
-      EXPECT_NEAR(goal_cost(geometry, start, 2.0), 0.05 * 0.05 + 2.0 * std::pow(std::atan2(0.03, 0.04), 2), 1e-9);
+      EXPECT_NEAR(tests::goal_cost(geometry, start, 2.0), 0.05 * 0.05 + 2.0 * std::pow(std::atan2(0.03, 0.04), 2), 1e-9);
     }
   }
 }
@@ -85,15 +86,15 @@ TEST_F(ObjectiveTerms, GoalAngleIsPiBehindTheHandAndZeroAhead) {
 TEST_F(ObjectiveTerms, GoalCostDoesNotChangeWhenEverythingMovesTogether) {
   place_hand(start, -0.2, 0.1, 0.3);
   place_in_hand(start, 0.07, 0.02);
-  const double before = goal_cost(geometry, start, 1.0);
+  const double before = tests::goal_cost(geometry, start, 1.0);
   place_hand(start, 0.15, -0.12, -1.9);
   place_in_hand(start, 0.07, 0.02);
-  EXPECT_NEAR(goal_cost(geometry, start, 1.0), before, 1e-12);
+  EXPECT_NEAR(tests::goal_cost(geometry, start, 1.0), before, 1e-12);
 }
 
 TEST_F(ObjectiveTerms, GoalCostOfATargetAtTheOriginOfTheHandIsZero) {
   place_hand(start, 0, 0, 0.4);
-  EXPECT_EQ(goal_cost(geometry, start, 1.0), 0.0);
+  EXPECT_EQ(tests::goal_cost(geometry, start, 1.0), 0.0);
 }
 
 TEST_F(ObjectiveTerms, AccelerationIsTheSquaredChangeOfControls) {
@@ -144,9 +145,9 @@ TEST_F(ObjectiveTerms, DisturbanceIgnoresTheRobot) {
 
 TEST_F(ObjectiveTerms, EdgeCostIsZeroInsideTheSafeZoneHoweverFarTheMove) {
   State after = start;
-  const double border = 0.3 - objective.edge_margin;
+  const double border = 0.3 - objective.value("edge", "margin");
   place(after, 1, border - 1e-9, -border + 1e-9);
-  EXPECT_EQ(edge_cost(geometry, start, after, objective), 0.0);
+  EXPECT_EQ(tests::edge_cost(geometry, start, after, objective), 0.0);
 }
 
 TEST_F(ObjectiveTerms, EdgeCostGrowsExponentiallyOutsideTheSafeZone) {
@@ -159,22 +160,22 @@ TEST_F(ObjectiveTerms, EdgeCostGrowsExponentiallyOutsideTheSafeZone) {
     State before = start, after = start;
     place(after, 1, side[0], side[1]);
     place(before, 1, side[0] - 0.03, side[1] + 0.04);  // 5 cm before
-    EXPECT_NEAR(edge_cost(geometry, before, after, gentle), std::exp(20 * 0.05), 1e-9);
-    EXPECT_DOUBLE_EQ(edge_cost(geometry, after, after, gentle), 1.0);  // out but still: exp(0)
+    EXPECT_NEAR(tests::edge_cost(geometry, before, after, gentle), std::exp(20 * 0.05), 1e-9);
+    EXPECT_DOUBLE_EQ(tests::edge_cost(geometry, after, after, gentle), 1.0);  // out but still: exp(0)
   }
 }
 
 TEST_F(ObjectiveTerms, EdgeCostIsCapped) {
   State after = start;
   place(after, 1, 0.29, 0);
-  EXPECT_DOUBLE_EQ(edge_cost(geometry, start, after, objective), std::exp(objective.edge_exponent_max));
+  EXPECT_DOUBLE_EQ(tests::edge_cost(geometry, start, after, objective), std::exp(objective.value("edge", "exponent_max")));
   place(after, 2, 0, 5.0);  // far off the table, and still finite
-  EXPECT_DOUBLE_EQ(edge_cost(geometry, start, after, objective), 2 * std::exp(objective.edge_exponent_max));
+  EXPECT_DOUBLE_EQ(tests::edge_cost(geometry, start, after, objective), 2 * std::exp(objective.value("edge", "exponent_max")));
 }
 
 TEST_F(ObjectiveTerms, EdgeCostCountsTheTargetToo) {
   place(start, 0, 0.29, 0);
-  EXPECT_DOUBLE_EQ(edge_cost(geometry, start, start, objective), 1.0);
+  EXPECT_DOUBLE_EQ(tests::edge_cost(geometry, start, start, objective), 1.0);
 }
 
 TEST_F(ObjectiveTerms, TopplingStartsAtTheAngleInEveryDirection) {
@@ -214,20 +215,20 @@ class Grasped : public ObjectiveTerms {
     return at_goal(geometry, start, objective);
   }
   static constexpr double kEps = 1e-9;
-  static constexpr double kMiddle = (hand::kGraspNear + hand::kGraspFar) / 2;
+  static constexpr double kMiddle = (kHand.near + kHand.far) / 2;
 };
 
 TEST_F(Grasped, IsInsideTheBordersOfTheRegionOnly) {
   for (const double rotation : {0.0, 1.0, -2.5}) {
     EXPECT_TRUE(at(kMiddle, 0, rotation));
-    EXPECT_TRUE(at(hand::kGraspNear + kEps, 0, rotation));
-    EXPECT_FALSE(at(hand::kGraspNear - kEps, 0, rotation));
-    EXPECT_TRUE(at(hand::kGraspFar - kEps, 0, rotation));
-    EXPECT_FALSE(at(hand::kGraspFar + kEps, 0, rotation));
-    EXPECT_TRUE(at(kMiddle, hand::kGraspSide - kEps, rotation));
-    EXPECT_FALSE(at(kMiddle, hand::kGraspSide + kEps, rotation));
-    EXPECT_TRUE(at(kMiddle, -hand::kGraspSide + kEps, rotation));
-    EXPECT_FALSE(at(kMiddle, -hand::kGraspSide - kEps, rotation));
+    EXPECT_TRUE(at(kHand.near + kEps, 0, rotation));
+    EXPECT_FALSE(at(kHand.near - kEps, 0, rotation));
+    EXPECT_TRUE(at(kHand.far - kEps, 0, rotation));
+    EXPECT_FALSE(at(kHand.far + kEps, 0, rotation));
+    EXPECT_TRUE(at(kMiddle, kHand.side - kEps, rotation));
+    EXPECT_FALSE(at(kMiddle, kHand.side + kEps, rotation));
+    EXPECT_TRUE(at(kMiddle, -kHand.side + kEps, rotation));
+    EXPECT_FALSE(at(kMiddle, -kHand.side - kEps, rotation));
   }
 }
 
@@ -242,10 +243,10 @@ TEST_F(Grasped, EndsAtTheFingersWhenTheHandIsNarrow) {
 
 TEST_F(Grasped, NeedsATargetThatStandsOnTheSurface) {
   ASSERT_TRUE(at(kMiddle, 0));
-  turn(start, 0, objective.topple_angle + 0.01, 1, 0, 0);
+  turn(start, 0, objective.value("topple", "angle") + 0.01, 1, 0, 0);
   EXPECT_FALSE(at(kMiddle, 0));
   turn(start, 0, 0, 1, 0, 0);
-  object(start, 0)[2] -= objective.drop_height + 1e-6;
+  object(start, 0)[2] -= objective.value("drop", "height") + 1e-6;
   EXPECT_FALSE(at(kMiddle, 0));
 }
 
@@ -266,36 +267,26 @@ TEST_F(ObjectiveTerms, ObstructionsAreOtherObjectsBetweenTheFingers) {
     return count_obstructions(geometry, start);
   };
   constexpr double kEps = 1e-9;
-  EXPECT_EQ(put(hand::kFingerLength / 2, 0.0), 1);
-  EXPECT_EQ(put(hand::kFingerLength + kEps, 0.0), 0);
+  EXPECT_EQ(put(kHand.finger_length / 2, 0.0), 1);
+  EXPECT_EQ(put(kHand.finger_length + kEps, 0.0), 0);
   EXPECT_EQ(put(-kEps, 0.0), 0);
   EXPECT_EQ(put(0.03, start.q[kJointLeft] + kEps), 0);
   EXPECT_EQ(put(0.03, -start.q[kJointRight] - kEps), 0);
   Objective strict = objective;
   strict.obstruction = 7;
-  const double clear = final_cost(geometry, strict, start);
+  const double clear = tests::final_cost(geometry, strict, start);
   ASSERT_EQ(put(0.03, 0.0), 1);
-  EXPECT_DOUBLE_EQ(final_cost(geometry, strict, start), clear + 7);
+  EXPECT_DOUBLE_EQ(tests::final_cost(geometry, strict, start), clear + 7);
 }
 
 TEST_F(ObjectiveTerms, RunningCostIsTheWeightedSum) {
-  const Objective weights{.acceleration = 3,
-                          .disturbance = 5,
-                          .disturbance_rotation = 0,
-                          .edge = 7,
-                          .edge_rate = 10,
-                          .edge_exponent_max = 50,
-                          .edge_margin = 0.05,
-                          .topple = 11,
-                          .topple_angle = 0.5,
-                          .drop = 13,
-                          .drop_height = 0.02};
+  const Objective weights = objective_with({{"acceleration", 3}, {"disturbance", 5}, {"disturbance_rotation", 0}, {"edge", 7}, {"edge_rate", 10}, {"edge_exponent_max", 50}, {"edge_margin", 0.05}, {"topple", 11}, {"topple_angle", 0.5}, {"drop", 13}, {"drop_height", 0.02}});
   State after = start;
   place(after, 1, 0.29, start.q[5 + 7 + 1]);  // from x = 0.05: 24 cm
   turn(after, 2, 1.0, 1, 0, 0);
   object(after, 0)[2] -= 0.03;
   const std::vector<double> u_before{0, 0, 0, 0}, u{0.1, 0, 0, 0.2};
-  EXPECT_NEAR(running_cost(geometry, weights, u_before, u, start, after),
+  EXPECT_NEAR(tests::running_cost(geometry, weights, u_before, u, start, after),
               3 * 0.05 + 5 * 0.24 * 0.24 + 7 * std::exp(2.4) + 11 * 1 + 13 * 1, 1e-9);
 }
 
@@ -304,7 +295,7 @@ TEST_F(ObjectiveTerms, AreNeverNegativeOrInfiniteForRandomStates) {
   for (int i = 0; i < 5000; ++i) {
     State a = start, b = start;
     for (State* x : {&a, &b}) {
-      for (int j = 0; j < kGripperJoints; ++j) x->q[std::size_t(j)] = random.normal(0, 2);
+      for (int j = 0; j < 5; ++j) x->q[std::size_t(j)] = random.normal(0, 2);
       for (int k = 0; k < 3; ++k) {
         double norm = 0.0;
         for (int j = 0; j < 3; ++j) object(*x, k)[j] = random.normal(0, 0.5);
@@ -315,9 +306,9 @@ TEST_F(ObjectiveTerms, AreNeverNegativeOrInfiniteForRandomStates) {
     const std::vector<double> u0{random.normal(0, 1), random.normal(0, 1), random.normal(0, 1), random.normal(0, 1)};
     const std::vector<double> u1{random.normal(0, 1), random.normal(0, 1), random.normal(0, 1), random.normal(0, 1)};
     for (const double cost :
-         {goal_cost(geometry, b, objective.angle), acceleration_cost(u0, u1), disturbance_cost(geometry, a, b, 1.0),
-          edge_cost(geometry, a, b, objective), double(toppled_objects(geometry, b, objective.topple_angle)),
-          double(count_dropped(geometry, b, objective.drop_height)), running_cost(geometry, objective, u0, u1, a, b)}) {
+         {tests::goal_cost(geometry, b, objective.value("goal", "angle")), acceleration_cost(u0, u1), disturbance_cost(geometry, a, b, 1.0),
+          tests::edge_cost(geometry, a, b, objective), double(toppled_objects(geometry, b, objective.value("topple", "angle"))),
+          double(count_dropped(geometry, b, objective.value("drop", "height"))), tests::running_cost(geometry, objective, u0, u1, a, b)}) {
       ASSERT_GE(cost, 0.0);
       ASSERT_TRUE(std::isfinite(cost));
     }

@@ -7,6 +7,7 @@
 #include "physics_pool/parareal/parareal_pool.hpp"
 #include "tests/support/batches.hpp"
 #include "tests/support/pushing.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::tests {
 namespace {
@@ -44,7 +45,7 @@ State relax(const State& start, double u) {
 
 struct Recursion {
   explicit Recursion(const PararealStop& stop, int steps = 4) : scene(one_slider()), update(scene), coarse(scene) {
-    controls.nu = kPusherAxes;
+    controls.nu = kPusherControls;
     for (int t = 0; t < steps; ++t) controls.append(std::vector{0.01 * t, 0.0});
     x0 = initial_state(scene);
     x0.q[0] = -1.0;  // the pusher is out of the way

@@ -36,7 +36,7 @@ Scene one_large(Shape shape) {
     object.size = {0.2, 0.2, 0.2};
   else
     object = {.name = "target", .shape = shape, .radius = 0.2, .height = 0.2, .mass = 0.5, .friction = 0.4};
-  scene.robot.x = -0.5;
+  scene.robot.q[0] = -0.5;
   return scene;
 }
 
@@ -83,7 +83,7 @@ TEST_P(PerturbAt, KeepsNamesShapesRobotAndTask) {
     EXPECT_EQ(belief.objects[i].name, truth.objects[i].name);
     EXPECT_EQ(belief.objects[i].shape, truth.objects[i].shape);
   }
-  EXPECT_EQ(belief.robot.x, truth.robot.x);
+  EXPECT_EQ(belief.robot.q[0], truth.robot.q[0]);
   EXPECT_EQ(belief.task.target, truth.task.target);
   EXPECT_EQ(belief.physics.time_step, truth.physics.time_step);
   EXPECT_NE(to_yaml(belief), to_yaml(truth));

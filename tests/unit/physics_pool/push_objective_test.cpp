@@ -9,9 +9,13 @@
 #include "physics_pool/objective/terms.hpp"
 #include "physics_pool/sampling/counter_rng.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/planar.hpp"
+#include "tests/support/costs.hpp"
 
 namespace jostle::physics_pool {
 namespace {
+
+using namespace tests;
 
 class PushTerms : public testing::Test {
  protected:
@@ -24,42 +28,42 @@ class PushTerms : public testing::Test {
 
   const Scene scene = tests::push_around();  // target, other; goal at (0.2, 0), obstacle at the origin
   const TaskGeometry geometry{scene};
-  const Objective objective;
+  const Objective objective = Objective::standard();
   State start = initial_state(scene);
 };
 
 TEST_F(PushTerms, GoalCostIsTheSquaredDistanceFromTheRegionsCentre) {
   place(start, 0, 0.2 - 0.3, 0.4);  // 3-4-5
-  EXPECT_NEAR(goal_distance(geometry, start), 0.5, 1e-15);
-  EXPECT_NEAR(goal_cost(geometry, start, 1.0), 0.25, 1e-15);
-  EXPECT_NEAR(final_cost(geometry, objective, start), objective.goal * 0.25, 1e-9);
+  EXPECT_NEAR(tests::goal_distance(geometry, start), 0.5, 1e-15);
+  EXPECT_NEAR(tests::goal_cost(geometry, start, 1.0), 0.25, 1e-15);
+  EXPECT_NEAR(tests::final_cost(geometry, objective, start), objective.weight("goal") * 0.25, 1e-9);
   start.q[kJointX] += 0.1;  // where the pusher is does not matter
-  EXPECT_NEAR(goal_cost(geometry, start, 1.0), 0.25, 1e-15);
+  EXPECT_NEAR(tests::goal_cost(geometry, start, 1.0), 0.25, 1e-15);
 }
 
 TEST_F(PushTerms, ThereIsNoHandToObstruct) { EXPECT_EQ(count_obstructions(geometry, start), 0); }
 
 TEST_F(PushTerms, ObstacleCostFallsWithTheSquaredDistances) {
-  const Objective weights{.obstacle_target = 3, .obstacle_pusher = 5};
+  const Objective weights = objective_with({{"obstacle_target", 3}, {"obstacle_pusher", 5}});
   place(start, 0, 0.3, 0.4);
   start.q[kJointX] = 0.0;
   start.q[kJointY] = -0.1;
-  EXPECT_NEAR(obstacle_cost(geometry, start, weights), 3 / 0.25 + 5 / 0.01, 1e-9);
+  EXPECT_NEAR(tests::obstacle_cost(geometry, start, weights), 3 / 0.25 + 5 / 0.01, 1e-9);
   place(start, 1, 0.0, 0.0);  // other objects may be there
-  EXPECT_NEAR(obstacle_cost(geometry, start, weights), 3 / 0.25 + 5 / 0.01, 1e-9);
+  EXPECT_NEAR(tests::obstacle_cost(geometry, start, weights), 3 / 0.25 + 5 / 0.01, 1e-9);
 }
 
 TEST_F(PushTerms, ObstacleCostIsCapped) {
-  const Objective weights{.obstacle_target = 3, .obstacle_pusher = 5, .obstacle_nearest = 0.1};
+  const Objective weights = objective_with({{"obstacle_target", 3}, {"obstacle_pusher", 5}, {"obstacle_nearest", 0.1}});
   place(start, 0, 0.0, 0.0);
   start.q[kJointX] = start.q[kJointY] = 0.0;
-  EXPECT_NEAR(obstacle_cost(geometry, start, weights), (3 + 5) / 0.01, 1e-9);
+  EXPECT_NEAR(tests::obstacle_cost(geometry, start, weights), (3 + 5) / 0.01, 1e-9);
 }
 
 TEST_F(PushTerms, NoObstacleCostsNothing) {
   const TaskGeometry free(tests::push_ahead());
   const State x = initial_state(tests::push_ahead());
-  EXPECT_EQ(obstacle_cost(free, x, objective), 0.0);
+  EXPECT_EQ(tests::obstacle_cost(free, x, objective), 0.0);
   EXPECT_FALSE(target_hits_obstacle(free, x));
   EXPECT_FALSE(pusher_hits_obstacle(free, x));
 }
@@ -107,10 +111,9 @@ TEST_F(PushTerms, CollisionsCountTargetAndPusher) {
   EXPECT_EQ(count_collisions(geometry, start), 1);
   start.q[kJointX] = -0.02;
   EXPECT_EQ(count_collisions(geometry, start), 2);
-  const Objective weights{
-      .acceleration = 0, .disturbance = 0, .obstacle_target = 0, .obstacle_pusher = 0, .collision = 7};
+  const Objective weights = objective_with({{"acceleration", 0}, {"disturbance", 0}, {"obstacle_target", 0}, {"obstacle_pusher", 0}, {"collision", 7}});
   const std::vector<double> u{0, 0};
-  EXPECT_EQ(running_cost(geometry, weights, u, u, start, start), 14.0);
+  EXPECT_EQ(tests::running_cost(geometry, weights, u, u, start, start), 14.0);
 }
 
 TEST_F(PushTerms, IntrudersAreOthersWhoseCentreIsInTheGoalRegion) {
@@ -128,19 +131,12 @@ TEST_F(PushTerms, AtGoalIsTheTargetsCentreInsideTheRegion) {
   EXPECT_FALSE(at_goal(geometry, start, objective));
   place(start, 0, 0.2, 0.04 - 1e-9);
   EXPECT_TRUE(at_goal(geometry, start, objective));
-  object(start, 0)[2] -= objective.drop_height + 1e-6;
+  object(start, 0)[2] -= objective.value("drop", "height") + 1e-6;
   EXPECT_FALSE(at_goal(geometry, start, objective));
 }
 
 TEST_F(PushTerms, RunningCostIsTheWeightedSum) {
-  const Objective weights{.acceleration = 3,
-                          .disturbance = 5,
-                          .edge = 7,
-                          .edge_margin = 0.05,
-                          .drop = 13,
-                          .obstacle_target = 17,
-                          .obstacle_pusher = 19,
-                          .intrusion = 23};
+  const Objective weights = objective_with({{"acceleration", 3}, {"disturbance", 5}, {"edge", 7}, {"edge_margin", 0.05}, {"drop", 13}, {"obstacle_target", 17}, {"obstacle_pusher", 19}, {"intrusion", 23}});
   State after = start;
   place(after, 0, 0.0, 0.2);
   place(after, 1, 0.2, 0.0);  // from (0, 0.25)
@@ -148,7 +144,7 @@ TEST_F(PushTerms, RunningCostIsTheWeightedSum) {
   after.q[kJointX] = -0.1;
   after.q[kJointY] = 0.0;
   const std::vector<double> u_before{0, 0}, u{0.1, 0.2};
-  EXPECT_NEAR(running_cost(geometry, weights, u_before, u, start, after),
+  EXPECT_NEAR(tests::running_cost(geometry, weights, u_before, u, start, after),
               3 * 0.05 + 5 * (0.2 * 0.2 + 0.25 * 0.25) + 13 + 17 / 0.04 + 19 / 0.01 + 23, 1e-9);
 }
 
@@ -157,15 +153,15 @@ TEST_F(PushTerms, AreNeverNegativeOrInfiniteForRandomStates) {
   for (int i = 0; i < 2000; ++i) {
     State a = start, b = start;
     for (State* x : {&a, &b}) {
-      for (int j = 0; j < kPusherJoints; ++j) x->q[std::size_t(j)] = random.normal(0, 0.1);
+      for (int j = 0; j < 2; ++j) x->q[std::size_t(j)] = random.normal(0, 0.1);
       for (int k = 0; k < 2; ++k) {
         for (int j = 0; j < 3; ++j) object(*x, k)[j] = random.normal(0, 0.1);
       }
     }
     const std::vector<double> u0{random.normal(0, 1), random.normal(0, 1)},
         u1{random.normal(0, 1), random.normal(0, 1)};
-    for (const double cost : {running_cost(geometry, objective, u0, u1, a, b), final_cost(geometry, objective, b),
-                              obstacle_cost(geometry, b, objective)}) {
+    for (const double cost : {tests::running_cost(geometry, objective, u0, u1, a, b), tests::final_cost(geometry, objective, b),
+                              tests::obstacle_cost(geometry, b, objective)}) {
       ASSERT_GE(cost, 0.0);
       ASSERT_TRUE(std::isfinite(cost));
     }
@@ -174,14 +170,14 @@ TEST_F(PushTerms, AreNeverNegativeOrInfiniteForRandomStates) {
 
 // Whatever the controls: only changes of control, and what has dropped, are certain.
 TEST_F(PushTerms, OutlookForetellsNothingOfThePush) {
-  ControlSequence controls{.nu = kPusherAxes, .values = {0.0, 0.0, 0.03, 0.04}};
+  ControlSequence controls{.nu = kPusherControls, .values = {0.0, 0.0, 0.03, 0.04}};
   const std::vector<double> u_before{0.0, 0.0};
   const Outlook far = outlook(geometry, objective, controls, 0, u_before, start, 1.0);
   EXPECT_TRUE(far.may_succeed);
-  EXPECT_NEAR(far.cost, objective.acceleration * 0.0025, 1e-12);
+  EXPECT_NEAR(far.cost, objective.weight("acceleration") * 0.0025, 1e-12);
   object(start, 0)[2] = -0.3;
   EXPECT_NEAR(outlook(geometry, objective, controls, 0, u_before, start, 1.0).cost,
-              objective.acceleration * 0.0025 + 2 * objective.drop, 1e-9);
+              objective.weight("acceleration") * 0.0025 + 2 * objective.weight("drop"), 1e-9);
 }
 
 }  // namespace

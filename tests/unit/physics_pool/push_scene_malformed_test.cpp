@@ -122,14 +122,11 @@ TEST(PushSceneYaml, ReadsBackBitForBit) {
   for (const Scene& scene : {tests::push_ahead(), tests::push_around()}) {
     Scene wanted = scene;
     wanted.task.goal = {.x = 0.1 + 0.2 - 0.3, .y = 1.0 / 3.0, .radius = 0.0401};
-    wanted.robot.radius = std::nextafter(0.0145, 1.0);
-    wanted.robot.height = 0.1234567890123;
+    wanted.robot = pusher({.x = -0.3, .radius = std::nextafter(0.0145, 1.0), .height = 0.1234567890123});
     wanted.physics.integrator = "rk4";
     const auto got = parse_scene(to_yaml(wanted), "again.yaml");
     ASSERT_TRUE(got) << got.error().message;
-    EXPECT_EQ(got->robot.model, "pusher");
-    EXPECT_EQ(got->robot.radius, wanted.robot.radius);
-    EXPECT_EQ(got->robot.height, wanted.robot.height);
+    EXPECT_EQ(got->robot, wanted.robot);
     EXPECT_EQ(got->task.goal.x, wanted.task.goal.x);
     EXPECT_EQ(got->task.goal.y, wanted.task.goal.y);
     EXPECT_EQ(got->task.goal.radius, wanted.task.goal.radius);

@@ -7,9 +7,12 @@
 #include "physics_pool/local/simulator.hpp"
 #include "physics_pool/scenarios/push.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::physics_pool {
 namespace {
+
+using namespace tests;
 
 // Advances a fresh simulator by one action, x[1] = F(x[0], u, seconds).
 State pushed(const Scene& scene, State x, const std::vector<double>& u, double seconds) {
@@ -32,14 +35,14 @@ class Pusher : public testing::TestWithParam<const char*> {
 
 TEST_P(Pusher, GoesWhereItIsToldWhenItMeetsNothing) {
   const State x = pushed(scene, initial_state(scene), {-0.06, 0.08}, 1.0);
-  EXPECT_NEAR(x.q[kJointX], scene.robot.x - 0.06, 5e-4);  // up to speed within 4 ms
-  EXPECT_NEAR(x.q[kJointY], scene.robot.y + 0.08, 5e-4);
+  EXPECT_NEAR(x.q[kJointX], scene.robot.q[0] - 0.06, 5e-4);  // up to speed within 4 ms
+  EXPECT_NEAR(x.q[kJointY], scene.robot.q[1] + 0.08, 5e-4);
 }
 
 TEST_P(Pusher, KeepsItsSpeedWhenItPushes) {
   const State x = pushed(scene, initial_state(scene), {0.1, 0.0}, 2.0);
   EXPECT_NEAR(x.v[kJointX], 0.1, 1e-3);
-  EXPECT_NEAR(x.q[kJointX], scene.robot.x + 0.2, 1e-3);
+  EXPECT_NEAR(x.q[kJointX], scene.robot.q[0] + 0.2, 1e-3);
 }
 
 TEST_P(Pusher, PushesACentredCylinderStraightAhead) {
@@ -54,9 +57,9 @@ TEST_P(Pusher, PushesACentredCylinderStraightAhead) {
 }
 
 TEST_P(Pusher, SymmetricPushesMirror) {
-  scene.robot.y = 0.02;  // off centre
+  scene.robot.q[1] = 0.02;  // off centre
   const State left = pushed(scene, initial_state(scene), {0.1, -0.01}, 1.5);
-  scene.robot.y = -0.02;
+  scene.robot.q[1] = -0.02;
   const State right = pushed(scene, initial_state(scene), {0.1, 0.01}, 1.5);
   EXPECT_NEAR(target(left)[0], target(right)[0], 1e-3);
   EXPECT_NEAR(target(left)[1], -target(right)[1], 1e-3);
@@ -74,7 +77,7 @@ TEST_P(Pusher, PassesOverTheObstacle) {
   Scene around = tests::push_around();
   around.physics.integrator = GetParam();
   const State x = pushed(around, initial_state(around), {0.1, 0.0}, 3.0);
-  EXPECT_NEAR(x.q[kJointX], around.robot.x + 0.3, 1e-3);  // a keep-out area, not a body
+  EXPECT_NEAR(x.q[kJointX], around.robot.q[0] + 0.3, 1e-3);  // a keep-out area, not a body
   EXPECT_TRUE(target_hits_obstacle(TaskGeometry(around), x));
 }
 
@@ -84,11 +87,11 @@ INSTANTIATE_TEST_SUITE_P(Integrators, Pusher, testing::Values("euler", "rk4"),
 // Turned by a right angle everything happens as before, turned by a right angle.
 TEST(PusherFrames, PushesAlikeInEveryDirection) {
   Scene scene = tests::push_ahead();
-  scene.robot.y = 0.015;
+  scene.robot.q[1] = 0.015;
   const State along_x = pushed(scene, initial_state(scene), {0.1, 0.0}, 1.5);
   Scene turned = scene;
-  turned.robot.x = -scene.robot.y;
-  turned.robot.y = scene.robot.x;
+  turned.robot.q[0] = -scene.robot.q[1];
+  turned.robot.q[1] = scene.robot.q[0];
   turned.objects[0].x = -scene.objects[0].y;
   turned.objects[0].y = scene.objects[0].x;
   const State along_y = pushed(turned, initial_state(turned), {0.0, 0.1}, 1.5);

@@ -11,9 +11,12 @@
 #include "physics_pool/local/simulator.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::physics_pool {
 namespace {
+
+using namespace tests;
 
 constexpr Fidelity kFrozen{.freeze = true};
 constexpr int kSecond = 500;  // engine steps of 2 ms
@@ -60,14 +63,14 @@ TEST(ReducedSimulator, FreeObjectMovesAsIfTheFrozenOnesWereNotThere) {
     ReducedSimulator sut(compile(scene), kFrozen);
     State a = initial_state(alone), b = initial_state(scene);
     const StateLayout layout = layout_of(scene);
-    a.v[kGripperJoints + 5] = b.v[static_cast<std::size_t>(layout.objects[moving].v) + 5] = 1.0;  // it spins, rad/s
+    a.v[5 + 5] = b.v[static_cast<std::size_t>(layout.objects[moving].v) + 5] = 1.0;  // it spins, rad/s
     const std::array u{0.0, 0.0, 0.0, 0.0};
 
     (void)fine.advance(a, u, kSecond / 10);
     const Advance advance = sut.advance(b, u, kSecond / 10);
 
     ASSERT_EQ(advance.thawed, 0u);
-    EXPECT_EQ(hash_of(std::vector<double>(a.q.begin() + kGripperJoints, a.q.end())),
+    EXPECT_EQ(hash_of(std::vector<double>(a.q.begin() + 5, a.q.end())),
               hash_of(std::vector<double>(pose(layout, b, moving).begin(), pose(layout, b, moving).end())));
   }
 }
@@ -133,9 +136,9 @@ TEST(ReducedSimulator, SurvivesAHandThatStandsAmidManyObjects) {
     scene.objects.push_back(tests::box(fmt::format("left{}", i), -0.46 - 0.045 * i, 0.062));
     scene.objects.push_back(tests::box(fmt::format("right{}", i), -0.46 - 0.045 * i, -0.062));
   }
-  scene.surface.size = {1.6, 0.6};
+  scene.surface = physics_pool::Surface::table(1.6, 0.6);
   scene.objects[0].name = "target";
-  scene.robot.x = -0.33;
+  scene.robot.q[0] = -0.33;
   ReducedSimulator sut(compile(scene), kFrozen);
   State x = initial_state(scene);
   const Advance advance = sut.advance(x, std::array{0.0, 0.0, 0.0, 0.0}, kSecond / 10);
@@ -221,7 +224,7 @@ class RandomPushes : public testing::Test {
 
   Rollout push(const WorldPtr& world, ReducedSimulator& sut, mjData& data, std::uint32_t sample) {
     SamplingLaw law{.sigma = {0.06, 0.06, 0.4, 0.01}, .limit = {0.15, 0.15, 0.8, 0.05}, .seed = 11};
-    ControlSequence nominal;
+    ControlSequence nominal{.nu = kGripperControls};
     for (int t = 0; t < 4; ++t) nominal.append(std::vector{0.08, 0.0, 0.0, 0.0});
     const ControlSequence controls = sample_controls(nominal, law, sample);
     Rollout rollout{.end = initial_state(world->scene())};
@@ -268,7 +271,7 @@ TEST_F(RandomPushes, FindEveryTouchAndAgreeWithTheFullModelWhereNothingIsTouched
       ASSERT_EQ(sut.advance(b, u, kSecond).thawed, 0u);
       ++untouched;
       const StateLayout& layout = world->geometry().layout;
-      for (int joint = 0; joint < kGripperJoints; ++joint) EXPECT_NEAR(a.q[joint], b.q[joint], 1e-9);
+      for (int joint = 0; joint < 5; ++joint) EXPECT_NEAR(a.q[joint], b.q[joint], 1e-9);
       for (std::size_t i = 0; i < layout.objects.size(); ++i) {
         EXPECT_LT(distance(pose(layout, a, i), pose(layout, b, i)), 0.001);
       }

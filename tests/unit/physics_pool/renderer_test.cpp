@@ -9,9 +9,12 @@
 
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::physics_pool {
 namespace {
+
+using namespace tests;
 
 using ::testing::HasSubstr;
 

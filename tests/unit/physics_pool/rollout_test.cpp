@@ -6,15 +6,18 @@
 
 #include "physics_pool/local/simulator.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/costs.hpp"
 
 namespace jostle::physics_pool {
 namespace {
+
+using namespace tests;
 
 class RolloutTest : public testing::Test {
  protected:
   RolloutTest() {
     Scene scene = tests::three_objects();
-    scene.robot.x = -0.2;
+    scene.robot.q[0] = -0.2;
     world = std::move(World::compile(scene)).value();
     sut = std::make_unique<Simulator>(world);
     batch.world = world->hash();
@@ -61,8 +64,8 @@ TEST_F(RolloutTest, FollowsFAndScoresEveryStep) {
     const State before = x;
     (void)sut->advance(x, controls.step(t), 200);
     EXPECT_EQ(outcome.trajectory[std::size_t(t) + 1], x);
-    double cost = running_cost(world->geometry(), batch.objective, u_before, controls.step(t), before, x);
-    if (t == 3) cost += batch.objective.goal * goal_cost(world->geometry(), x, batch.objective.angle);
+    double cost = tests::running_cost(world->geometry(), batch.objective, u_before, controls.step(t), before, x);
+    if (t == 3) cost += batch.objective.weight("goal") * tests::goal_cost(world->geometry(), x, batch.objective.value("goal", "angle"));
     EXPECT_DOUBLE_EQ(outcome.step_costs[std::size_t(t)], cost);
     total += cost;
     u_before.assign(controls.step(t).begin(), controls.step(t).end());

@@ -8,24 +8,21 @@
 #include <numbers>
 
 #include "physics_pool/scenarios/chapter3.hpp"
-#include "physics_pool/scene/planar_gripper.hpp"
+#include "tests/support/planar.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {
 namespace {
 
+using namespace tests;
+
 using testing::HasSubstr;
 
 void expect_same(const Scene& a, const Scene& b) {
   EXPECT_EQ(a.name, b.name);
-  EXPECT_EQ(a.surface.kind, b.surface.kind);
-  EXPECT_EQ(a.surface.size, b.surface.size);
-  EXPECT_EQ(a.surface.wall_height, b.surface.wall_height);
-  EXPECT_EQ(a.robot.model, b.robot.model);
-  EXPECT_EQ(a.robot.x, b.robot.x);
-  EXPECT_EQ(a.robot.y, b.robot.y);
-  EXPECT_EQ(a.robot.rotation, b.robot.rotation);
-  EXPECT_EQ(a.robot.opening, b.robot.opening);
+  EXPECT_EQ(a.surface, b.surface);
+  EXPECT_EQ(a.fixtures, b.fixtures);
+  EXPECT_EQ(a.robot, b.robot);
   EXPECT_EQ(a.task.kind, b.task.kind);
   EXPECT_EQ(a.task.target, b.task.target);
   EXPECT_EQ(a.physics.time_step, b.physics.time_step);
@@ -74,7 +71,8 @@ TEST(SceneYaml, ReadsBackAwkwardNumbersBitForBit) {
 
 TEST(SceneYaml, ReadsBackShelvesBitForBit) {
   Scene scene = tests::three_objects();
-  scene.surface = {.kind = Surface::Kind::kShelf, .size = {0.55, 0.71}, .wall_height = 0.123};
+  scene.surface = Surface::table(0.55, 0.71);
+  scene.fixtures = shelf_walls(scene.surface.parts[0], 0.123);
   const auto again = parse_scene(to_yaml(scene), "again.yaml");
   ASSERT_TRUE(again) << again.error().message;
   expect_same(scene, *again);
@@ -129,10 +127,13 @@ TEST(SceneHash, ChangesWithEveryField) {
     EXPECT_NE(scene_hash(scene), base);
   };
   EXPECT_EQ(scene_hash(tests::three_objects()), base);
-  expect_changed([](Scene& s) { s.surface.size[1] += 1e-12; });
-  expect_changed([](Scene& s) { s.surface.kind = Surface::Kind::kShelf; });
-  expect_changed([](Scene& s) { s.robot.x = std::nextafter(s.robot.x, 0.0); });
-  expect_changed([](Scene& s) { s.robot.opening -= 0.001; });
+  expect_changed([](Scene& s) { s.surface.parts[0].size[1] += 1e-12; });
+  expect_changed([](Scene& s) { s.surface.parts.push_back({.x = 0.4, .size = {0.1, 0.2}}); });
+  expect_changed([](Scene& s) { s.fixtures = shelf_walls(s.surface.parts[0], 0.2); });
+  expect_changed([](Scene& s) { s.robot.q[0] = std::nextafter(s.robot.q[0], 0.0); });
+  expect_changed([](Scene& s) { s.robot.q[kJointLeft] -= 0.001; });
+  expect_changed([](Scene& s) { s.robot.base.position[2] += 0.001; });
+  expect_changed([](Scene& s) { s.robot.model.joints[0].gain += 1e-9; });
   expect_changed([](Scene& s) { s.objects[0].mass += 1e-9; });
   expect_changed([](Scene& s) { s.objects[1].radius += 1e-9; });
   expect_changed([](Scene& s) { s.objects[2].yaw += 1e-9; });
@@ -168,7 +169,7 @@ TEST(Layout, PutsTheRobotFirstAndThenEveryObject) {
 
 TEST(InitialState, IsAtRestWhereTheSceneSays) {
   Scene scene = tests::three_objects();
-  scene.robot = {.x = -0.31, .y = 0.02, .rotation = 0.1, .opening = 0.06};
+  scene.robot = planar_gripper({.x = -0.31, .y = 0.02, .rotation = 0.1, .opening = 0.06});
   const State x = initial_state(scene);
   EXPECT_EQ(x.v, std::vector<double>(23, 0.0));
   ASSERT_EQ(x.q.size(), 26u);
@@ -235,20 +236,19 @@ TEST(Overlap, SeesAnObjectInsideAnother) {
 }
 
 TEST(OverlapsRobot, LeavesTheSpaceBetweenTheFingersFree) {
-  namespace hand = planar_gripper;
   Scene scene = tests::target_only();
-  scene.robot = {.x = 0, .y = 0, .rotation = 0, .opening = 0.085};
-  EXPECT_FALSE(overlaps_robot(scene, tests::box("b", hand::kGraspDepth, 0)));
-  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", hand::kGraspDepth, 0.03)));   // left finger
-  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", hand::kGraspDepth, -0.03)));  // right finger
+  scene.robot = planar_gripper({.x = 0, .y = 0, .rotation = 0, .opening = 0.085});
+  EXPECT_FALSE(overlaps_robot(scene, tests::box("b", kHand.depth, 0)));
+  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", kHand.depth, 0.03)));   // left finger
+  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", kHand.depth, -0.03)));  // right finger
   EXPECT_TRUE(overlaps_robot(scene, tests::box("b", -0.05, 0)));                  // palm
   EXPECT_TRUE(overlaps_robot(scene, tests::box("b", -0.25, 0)));                  // arm
-  EXPECT_FALSE(overlaps_robot(scene, tests::box("b", hand::kFingerLength + 0.021, 0.05)));
+  EXPECT_FALSE(overlaps_robot(scene, tests::box("b", kHand.finger_length + 0.021, 0.05)));
 }
 
 TEST(OverlapsRobot, TurnsWithTheRobot) {
   Scene scene = tests::target_only();
-  scene.robot = {.x = 0, .y = 0, .rotation = std::numbers::pi / 2, .opening = 0.085};
+  scene.robot = planar_gripper({.x = 0, .y = 0, .rotation = std::numbers::pi / 2, .opening = 0.085});
   EXPECT_TRUE(overlaps_robot(scene, tests::box("b", 0, -0.25)));  // arm now along -y
   EXPECT_FALSE(overlaps_robot(scene, tests::box("b", -0.25, 0)));
   EXPECT_TRUE(overlaps_robot(scene, tests::box("b", 0.045, 0.04)));  // right finger at +x

@@ -9,13 +9,13 @@
 #include <filesystem>
 
 #include "physics_pool/scenarios/chapter3.hpp"
-#include "physics_pool/scene/planar_gripper.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::physics_pool {
 namespace {
 
-namespace hand = planar_gripper;
+using namespace tests;
 
 constexpr double kGravity = 9.81;
 const std::vector<double> kStill{0, 0, 0, 0};
@@ -156,7 +156,7 @@ INSTANTIATE_TEST_SUITE_P(FrictionAndSpeed, SlidingObject,
 
 TEST_F(SimulatorTest, EndsAPushWithTheObjectAtThePalm) {
   Scene scene = tests::target_only();
-  scene.robot.x = -0.2;
+  scene.robot.q[0] = -0.2;
   use(scene);
   ASSERT_TRUE(run({0.05, 0, 0, 0}, 5.0).diverged.empty());  // from 180 mm to the box at 250 mm
   const double gap = object(*world, x, 0).p[0] - 0.02 - x.q[kJointX];
@@ -174,17 +174,17 @@ TEST_F(SimulatorTest, EndsAPushWithTheObjectAtThePalm) {
 TEST_F(SimulatorTest, PushesAWideObjectWithTheFingertips) {
   Scene scene = tests::target_only();
   scene.objects[0].size = {0.04, 0.15, 0.038};
-  scene.robot.x = -0.2;
+  scene.robot.q[0] = -0.2;
   use(scene);
   ASSERT_TRUE(run({0.05, 0, 0, 0}, 4.0).diverged.empty());
-  const double gap = object(*world, x, 0).p[0] - 0.02 - (x.q[kJointX] + hand::kFingerLength);
+  const double gap = object(*world, x, 0).p[0] - 0.02 - (x.q[kJointX] + kHand.finger_length);
   EXPECT_NEAR(gap, 0.0, 5e-4);
   EXPECT_GT(object(*world, x, 0).p[0], 0.04);
 }
 
 TEST_F(SimulatorTest, ReachesTheCommandedVelocityOnEveryAxis) {
   Scene scene = tests::target_only();
-  scene.robot = {.x = -0.8, .y = 0.0, .opening = 0.04};
+  scene.robot = physics_pool::planar_gripper({.x = -0.8, .y = 0.0, .opening = 0.04});
   use(scene);
   ASSERT_TRUE(run({-0.1, 0.08, 0.5, 0.03}, 0.3).diverged.empty());
   EXPECT_NEAR(x.v[kJointX], -0.1, 0.005);
@@ -195,7 +195,7 @@ TEST_F(SimulatorTest, ReachesTheCommandedVelocityOnEveryAxis) {
 
 TEST_F(SimulatorTest, MovesAsFarAsVelocityTimesTime) {
   Scene scene = tests::target_only();
-  scene.robot = {.x = -0.8, .opening = 0.04};
+  scene.robot = physics_pool::planar_gripper({.x = -0.8, .opening = 0.04});
   use(scene);
   ASSERT_TRUE(run({0.1, -0.1, 0.5, 0}, 1.0).diverged.empty());
   // The servo's time constant of about 10 ms is lost at the start.
@@ -206,12 +206,12 @@ TEST_F(SimulatorTest, MovesAsFarAsVelocityTimesTime) {
 
 TEST_F(SimulatorTest, StopsTheFingersAtTheirLimits) {
   Scene scene = tests::target_only();
-  scene.robot = {.x = -0.8, .opening = 0.04};
+  scene.robot = physics_pool::planar_gripper({.x = -0.8, .opening = 0.04});
   use(scene);
   const State start = x;
   ASSERT_TRUE(run({0, 0, 0, 0.05}, 3.0).diverged.empty());
-  EXPECT_NEAR(x.q[kJointLeft], hand::kStroke / 2, 1e-3);
-  EXPECT_NEAR(x.q[kJointRight], hand::kStroke / 2, 1e-3);
+  EXPECT_NEAR(x.q[kJointLeft], kHand.stroke / 2, 1e-3);
+  EXPECT_NEAR(x.q[kJointRight], kHand.stroke / 2, 1e-3);
   x = start;
   ASSERT_TRUE(run({0, 0, 0, -0.05}, 3.0).diverged.empty());
   EXPECT_NEAR(x.q[kJointLeft], 0.0, 1e-3);
@@ -220,7 +220,7 @@ TEST_F(SimulatorTest, StopsTheFingersAtTheirLimits) {
 
 TEST_F(SimulatorTest, MovesMirroredWhenEverythingIsMirrored) {
   Scene scene = tests::three_objects();
-  scene.robot.x = -0.15;
+  scene.robot.q[0] = -0.15;
   scene.objects[2].yaw = 0;
   Scene mirror = scene;
   for (SceneObject& o : mirror.objects) o.y = -o.y;
@@ -239,7 +239,7 @@ TEST_F(SimulatorTest, MovesMirroredWhenEverythingIsMirrored) {
 
 TEST_F(SimulatorTest, StopsAtTheWallsOfAShelf) {
   Scene scene = tests::three_objects();
-  scene.surface.kind = Surface::Kind::kShelf;
+  scene.fixtures = shelf_walls(scene.surface.parts[0], 0.15);
   use(scene);
   object(*world, x, 1).v[1] = 1.5;  // the can at y = 0.12, fast enough for 0.38 m
   ASSERT_TRUE(run(kStill, 1.0).diverged.empty());
@@ -300,7 +300,7 @@ TEST(World, StartsInTheStateOfItsScene) {
   const Scene scene = tests::three_objects();
   const WorldPtr world = compiled(scene);
   const State x = initial_state(scene);
-  for (std::size_t i = kGripperJoints; i < x.q.size(); ++i) {
+  for (std::size_t i = 5; i < x.q.size(); ++i) {
     EXPECT_NEAR(world->model()->qpos0[i], x.q[i], 1e-12);
   }
 }
@@ -343,10 +343,10 @@ TEST(Separate, LeavesTheRobotInPlaceWhenAnObjectIsInsideIt) {
   const Scene scene = tests::target_only();
   const WorldPtr world = compiled(scene);
   State x = initial_state(scene);
-  object(*world, x, 0).p[0] = scene.robot.x + 0.015;  // 5 mm inside the palm
+  object(*world, x, 0).p[0] = scene.robot.q[0] + 0.015;  // 5 mm inside the palm
   State y = separate(*world, x);
-  for (std::size_t i = 0; i < kGripperJoints; ++i) EXPECT_EQ(y.q[i], x.q[i]);
-  EXPECT_GT(object(*world, y, 0).p[0], scene.robot.x + 0.02 - 0.0006);
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(y.q[i], x.q[i]);
+  EXPECT_GT(object(*world, y, 0).p[0], scene.robot.q[0] + 0.02 - 0.0006);
 }
 
 }  // namespace

@@ -4,16 +4,17 @@
 
 #include <cmath>
 
-#include "physics_pool/scene/planar_gripper.hpp"
 #include "tests/support/kinematic_world.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::planners {
 namespace {
 
+using namespace tests;
+
 using testing::HasSubstr;
 using Method = ControlOptions::Method;
-namespace hand = physics_pool::planar_gripper;
 
 class ControllerTest : public testing::Test {
  protected:
@@ -333,19 +334,19 @@ TEST_F(OnlineReplanning, DemandsAClearHandOnlyAfterPatienceAndWithSomethingInIt)
 
 TEST_F(OnlineReplanning, BacksOffByAFingersLengthWhenThePlanDropsAnObject) {
   planner.predicts_goal = false;
-  planner.change = [this](Plan& plan, int) { plan.cost = setup.objective.drop; };
+  planner.change = [this](Plan& plan, int) { plan.cost = setup.objective.weight("drop"); };
   grasp_after(2);
   (void)outcome();
   ASSERT_EQ(planner.problems.size(), 2u);
   const Problem& way_out = planner.problems[1];
   double back = 0.0;
   for (int t = 0; t < way_out.initial.steps(); ++t) back += std::min(way_out.initial.step(t)[kControlX], 0.0);
-  EXPECT_NEAR(back, -physics_pool::planar_gripper::kFingerLength, 1e-12);
+  EXPECT_NEAR(back, -kHand.finger_length, 1e-12);
   EXPECT_EQ(way_out.initial.steps(), options.initial_steps);
   // and forward again, to where the hand would have gone
   State x1 = way_out.x0;
   for (int t = 0; t < way_out.initial.steps(); ++t) x1 = tests::moved(x1, way_out.initial.step(t), 1.0);
-  EXPECT_NEAR(physics_pool::target_bearing(geometry, x1).distance, physics_pool::planar_gripper::kGraspDepth, 1e-12);
+  EXPECT_NEAR(physics_pool::target_bearing(geometry, x1).distance, kHand.depth, 1e-12);
 }
 
 TEST_F(OnlineReplanning, ReplansOnceTooFewControlsAreLeft) {
@@ -402,7 +403,7 @@ TEST_F(OnlineReplanning, AddsAStraightStepAtStraightSpeedTowardsTheTarget) {
   (void)outcome();
   const ControlSequence& warm = planner.problems.at(1).initial;
   const auto last = warm.step(warm.steps() - 1);
-  const double dx = initial_state(scene).q[5] - scene.robot.x, dy = initial_state(scene).q[6] - scene.robot.y;
+  const double dx = initial_state(scene).q[5] - scene.robot.q[0], dy = initial_state(scene).q[6] - scene.robot.q[1];
   EXPECT_NEAR(last[kControlX], options.straight_speed * dx / std::hypot(dx, dy), 1e-12);
   EXPECT_NEAR(last[kControlY], options.straight_speed * dy / std::hypot(dx, dy), 1e-12);
   EXPECT_EQ(last[kControlOpening], 0.0);
@@ -470,16 +471,16 @@ TEST_F(StraightLine, ReachesThePregraspDistanceInItsTime) {
     ASSERT_EQ(controls.steps(), 6);
     for (int t = 0; t < 6; ++t) reached = tests::moved(reached, controls.step(t), 0.5);
     const double dx = px - reached.q[kJointX], dy = py - reached.q[kJointY];
-    EXPECT_NEAR(std::hypot(dx, dy), hand::kGraspDepth, 1e-12);
+    EXPECT_NEAR(std::hypot(dx, dy), kHand.depth, 1e-12);
     // On the straight line from the start to the target.
-    EXPECT_NEAR(dx * (py - scene.robot.y), dy * (px - scene.robot.x), 1e-12);
+    EXPECT_NEAR(dx * (py - scene.robot.q[1]), dy * (px - scene.robot.q[0]), 1e-12);
   }
 }
 
 TEST_F(StraightLine, BacksOffFromATargetThatIsTooClose) {
   x.q[kJointX] = object(0)[0] - 0.01;
   const ControlSequence controls = straight_line(geometry, x, 1, 1.0);
-  EXPECT_NEAR(controls.step(0)[kControlX], 0.01 - hand::kGraspDepth, 1e-12);
+  EXPECT_NEAR(controls.step(0)[kControlX], 0.01 - kHand.depth, 1e-12);
 }
 
 TEST_F(StraightLine, StandsStillOnTopOfTheTarget) {
@@ -518,7 +519,7 @@ TEST_F(AssembleState, PutsReadingsInTheOrderOfTheLayout) {
   for (std::size_t i = 0; i < x.v.size(); ++i) x.v[i] = double(i);
   auto reading = robot.read();
   ASSERT_TRUE(reading);
-  reading->v.assign(x.v.begin(), x.v.begin() + kGripperJoints);
+  reading->v.assign(x.v.begin(), x.v.begin() + 5);
   const auto state = assemble_state(geometry.layout, *reading, *objects.read());
   ASSERT_TRUE(state) << state.error().message;
   EXPECT_EQ(*state, x);

@@ -6,9 +6,12 @@
 
 #include "tests/support/kinematic_world.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/planar.hpp"
 
 namespace jostle::planners {
 namespace {
+
+using namespace tests;
 
 using testing::HasSubstr;
 
@@ -54,7 +57,7 @@ class MpcTest : public testing::Test {
   const physics_pool::Scene scene = tests::push_around();  // target, other; goal at (0.2, 0)
   const physics_pool::TaskGeometry geometry{scene};
   State x = initial_state(scene);
-  tests::KinematicRobot robot{x, kPusherJoints};
+  tests::KinematicRobot robot{x, 2};
   tests::KinematicObjects objects{geometry.layout, x};
   tests::KinematicPlanner planner;
   ControlSetup setup{.planner = planner,
@@ -104,7 +107,7 @@ TEST_F(MpcTest, PlansFromWhatItObserves) {
   ASSERT_GE(planner.problems.size(), 2u);
   EXPECT_EQ(object(planner.problems[1].x0, 0)[0], -0.1);
   EXPECT_EQ(object(planner.problems[1].x0, 0)[1], 0.05);
-  EXPECT_DOUBLE_EQ(planner.problems[1].x0.q[kJointX], scene.robot.x + robot.executed[0][kControlX]);
+  EXPECT_DOUBLE_EQ(planner.problems[1].x0.q[kJointX], scene.robot.q[0] + robot.executed[0][kControlX]);
 }
 
 TEST_F(MpcTest, StartsWarmWithTheShiftedPlanAndAStraightPush) {
@@ -114,7 +117,7 @@ TEST_F(MpcTest, StartsWarmWithTheShiftedPlanAndAStraightPush) {
     // The pusher stays behind it.
     plan.states.back().q[kJointX] = 0.1;
     plan.states.back().q[kJointY] = -0.14;
-    const auto target = plan.states.back().q.begin() + kPusherJoints;
+    const auto target = plan.states.back().q.begin() + 2;
     target[0] = 0.2 - 0.03;  // predicted 5 cm before the goal, 3-4-5
     target[1] = -0.04;
   };
@@ -267,7 +270,7 @@ TEST_F(MpcTest, EndsWhenCancelled) {
 TEST_F(MpcTest, StraightPushEndsAtTheGoalAndKeepsToTheSpeed) {
   const ControlSequence fast = straight_push(geometry, x, 8, 1.0, 0.1);  // 0.4 m in 8 s
   ASSERT_EQ(fast.steps(), 8);
-  ASSERT_EQ(fast.nu, kPusherAxes);
+  ASSERT_EQ(fast.nu, kPusherControls);
   EXPECT_NEAR(fast.step(7)[kControlX], 0.05, 1e-12);
   EXPECT_NEAR(fast.step(7)[kControlY], 0.0, 1e-12);
   object(x, 0)[1] = -0.3;  // 3-4-5

@@ -200,7 +200,7 @@ TEST_F(PbstoTest, AsksForWhatItsOptionsSay) {
   options.min_steps = 3;
   options.sigma = {0.01, 0.02, 0.03, 0.04};
   options.limit = {1, 2, 3, 4};
-  options.objective.goal = 77;
+  options.objective["goal"].weight = 77;
   (void)planned(problem(1));
   const auto& batch = pool.batches.back();
   EXPECT_EQ(batch.samples, 13u);
@@ -208,18 +208,18 @@ TEST_F(PbstoTest, AsksForWhatItsOptionsSay) {
   EXPECT_EQ(batch.min_steps, 3);
   EXPECT_EQ(batch.law.sigma, options.sigma);
   EXPECT_EQ(batch.law.limit, options.limit);
-  EXPECT_EQ(batch.objective.goal, 77);
+  EXPECT_EQ(batch.objective.weight("goal"), 77);
   EXPECT_TRUE(batch.stop_on_success);
 }
 
 TEST_F(PbstoTest, CountsObstructionsOnlyWhenTheHandMustBeClear) {
-  options.objective.obstruction = 55;
+  options.objective["obstruction"].weight = 55;
   Problem p = problem(1);
   (void)planned(p);
-  EXPECT_EQ(pool.batches.back().objective.obstruction, 0.0);
+  EXPECT_EQ(pool.batches.back().objective.weight("obstruction"), 0.0);
   p.clear_hand = true;
   (void)planned(p);
-  EXPECT_EQ(pool.batches.back().objective.obstruction, 55);
+  EXPECT_EQ(pool.batches.back().objective.weight("obstruction"), 55);
 }
 
 TEST_F(PbstoTest, GreedyPicksTheCheapestSample) {

@@ -205,14 +205,14 @@ TEST_P(SamplingMethod, AsksForWhatItsOptionsSay) {
   options.step_duration = 0.7;
   options.min_steps = 3;
   options.limit = {1, 2, 3, 4};
-  options.objective.goal = 77;
+  options.objective["goal"].weight = 77;
   options.fidelity = {.freeze = true, .time_step = 0.01};
   (void)planned(problem(2));
   for (const RolloutBatch& batch : pool.batches) {
     EXPECT_EQ(batch.step_duration, 0.7);
     EXPECT_EQ(batch.min_steps, 3);
     EXPECT_EQ(batch.law.limit, options.limit);
-    EXPECT_EQ(batch.objective.goal, 77);
+    EXPECT_EQ(batch.objective.weight("goal"), 77);
     EXPECT_EQ(batch.fidelity, options.fidelity);
     EXPECT_TRUE(batch.stop_on_success);
     // Among noisy samples, only predictive sampling can do without the costs of losers.

@@ -1,10 +1,12 @@
 #include "services/task/config/parameters.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include <cstring>
 #include <filesystem>
 #include <fstream>
+
+#include "tests/support/costs.hpp"
 
 namespace jostle::task {
 namespace {
@@ -30,13 +32,30 @@ TEST(Parameters, KeepDefaultsOfWhatTheFileLeavesOut) {
   EXPECT_EQ(sut.planner.min_steps, wanted.planner.min_steps);
   EXPECT_EQ(sut.planner.step_duration, wanted.planner.step_duration);
   EXPECT_EQ(sut.planner.stop_losers, wanted.planner.stop_losers);
-  EXPECT_EQ(sut.planner.objective.goal, wanted.planner.objective.goal);
-  EXPECT_EQ(sut.planner.objective.edge_exponent_max, wanted.planner.objective.edge_exponent_max);
+  EXPECT_EQ(sut.planner.objective.weight("goal"), wanted.planner.objective.weight("goal"));
+  EXPECT_EQ(sut.planner.objective.value("edge", "exponent_max"), wanted.planner.objective.value("edge", "exponent_max"));
   EXPECT_EQ(sut.planner.objective.success_cost, wanted.planner.objective.success_cost);
-  EXPECT_EQ(sut.control.many_iterations, wanted.control.many_iterations);
-  EXPECT_EQ(sut.control.deviation_threshold, wanted.control.deviation_threshold);
-  EXPECT_EQ(sut.control.timeout, wanted.control.timeout);
-  EXPECT_EQ(sut.control.close_hand, wanted.control.close_hand);
+  EXPECT_EQ(sut.controller.control.many_iterations, wanted.controller.control.many_iterations);
+  EXPECT_EQ(sut.controller.control.deviation_threshold, wanted.controller.control.deviation_threshold);
+  EXPECT_EQ(sut.controller.control.timeout, wanted.controller.control.timeout);
+  EXPECT_EQ(sut.controller.control.close_hand, wanted.controller.control.close_hand);
+}
+
+// Whatever the catalogue has, files may say.
+TEST(Parameters, TakeEveryTermOfTheCatalogue) {
+  for (const physics_pool::TermKind* kind : physics_pool::term_catalogue()) {
+    EXPECT_EQ(parsed(fmt::format("objective: {{{}: 0.125}}", kind->name)).planner.objective,
+              tests::objective_with({{kind->name, 0.125}}));
+    for (const physics_pool::TermParameter& parameter : kind->parameters) {
+      const std::string key = fmt::format("{}_{}", kind->name, parameter.name);
+      EXPECT_EQ(parsed(fmt::format("objective: {{{}: 0.125}}", key)).planner.objective,
+                tests::objective_with({{key, 0.125}}));
+    }
+  }
+}
+
+TEST(Parameters, StillCallTheGoalsAngleByItsFirstName) {
+  EXPECT_EQ(parsed("objective: {angle: 7}\n").planner.objective, tests::objective_with({{"goal_angle", 7}}));
 }
 
 TEST(Parameters, TakeEveryKey) {
@@ -46,7 +65,7 @@ min_steps: 4
 planner: {rollouts: 3, sigma: [1, 2, 3, 4], limit: [5, 6, 7, 8], scales: [0.5, 2], update: cost-weighted, lambda: 9, persistence: 0.9, stop_losers: false,
           stop_hopeless: true, freeze: true, screening: 32, screening_time_step: 0.005}
 objective: {goal: 10, angle: 11, acceleration: 12, disturbance: 13, disturbance_rotation: 14, edge: 15, edge_rate: 16,
-            edge_exponent_max: 17, edge_margin: 18, topple: 19, topple_angle: 20, drop: 21, drop_height: 22, success_cost: 23, obstruction: 24,
+            edge_exponent_max: 17, edge_margin: 18, topple: 19, topple_angle: 0.2, drop: 21, drop_height: 22, success_cost: 23, obstruction: 24,
             obstacle_target: 25, obstacle_pusher: 26, obstacle_nearest: 27, intrusion: 28, collision: 29}
 control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, initial_steps: 27, straight_speed: 0.28,
           few_iterations_max: 30, obstruction_patience: 31,
@@ -54,9 +73,9 @@ control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, init
 mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straight_speed: 0.36}
 )");
   EXPECT_EQ(sut.planner.step_duration, 0.5);
-  EXPECT_EQ(sut.control.step_duration, 0.5);
+  EXPECT_EQ(sut.controller.control.step_duration, 0.5);
   EXPECT_EQ(sut.planner.min_steps, 4);
-  EXPECT_EQ(sut.control.min_steps, 4);
+  EXPECT_EQ(sut.controller.control.min_steps, 4);
   EXPECT_EQ(sut.planner.rollouts, 3);
   EXPECT_THAT(sut.planner.sigma, testing::ElementsAre(1, 2, 3, 4));
   EXPECT_THAT(sut.planner.limit, testing::ElementsAre(5, 6, 7, 8));
@@ -69,44 +88,42 @@ mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straig
   EXPECT_TRUE(sut.planner.freeze);
   EXPECT_EQ(sut.planner.screening, 32);
   EXPECT_EQ(sut.planner.screening_time_step, 0.005);
-  const auto& o = sut.planner.objective;
-  EXPECT_THAT((std::vector{o.goal,
-                           o.angle,
-                           o.acceleration,
-                           o.disturbance,
-                           o.disturbance_rotation,
-                           o.edge,
-                           o.edge_rate,
-                           o.edge_exponent_max,
-                           o.edge_margin,
-                           o.topple,
-                           o.topple_angle,
-                           o.drop,
-                           o.drop_height,
-                           o.success_cost,
-                           o.obstruction,
-                           o.obstacle_target,
-                           o.obstacle_pusher,
-                           o.obstacle_nearest,
-                           o.intrusion,
-                           o.collision}),
-              testing::ElementsAre(10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29));
-  EXPECT_EQ(sut.control.many_iterations, 24);
-  EXPECT_EQ(sut.control.few_iterations, 25);
-  EXPECT_EQ(sut.control.deviation_threshold, 26);
-  EXPECT_EQ(sut.control.initial_steps, 27);
-  EXPECT_EQ(sut.control.straight_speed, 0.28);
-  EXPECT_EQ(sut.control.few_iterations_max, 30);
-  EXPECT_EQ(sut.control.obstruction_patience, 31);
-  EXPECT_EQ(sut.control.timeout, std::chrono::milliseconds(29500));
-  EXPECT_FALSE(sut.control.close_hand);
-  EXPECT_EQ(sut.mpc.horizon, 32);
-  EXPECT_EQ(sut.mpc.first_iterations, 33);
-  EXPECT_EQ(sut.mpc.iterations, 34);
-  EXPECT_EQ(sut.mpc.max_actions, 35);
-  EXPECT_EQ(sut.mpc.straight_speed, 0.36);
-  EXPECT_EQ(sut.mpc.step_duration, 0.5);
-  EXPECT_EQ(sut.mpc.timeout, std::chrono::milliseconds(29500));
+  EXPECT_EQ(sut.planner.objective, tests::objective_with({{"goal", 10},
+                                                          {"goal_angle", 11},
+                                                          {"acceleration", 12},
+                                                          {"disturbance", 13},
+                                                          {"disturbance_rotation", 14},
+                                                          {"edge", 15},
+                                                          {"edge_rate", 16},
+                                                          {"edge_exponent_max", 17},
+                                                          {"edge_margin", 18},
+                                                          {"topple", 19},
+                                                          {"topple_angle", 0.2},
+                                                          {"drop", 21},
+                                                          {"drop_height", 22},
+                                                          {"success_cost", 23},
+                                                          {"obstruction", 24},
+                                                          {"obstacle_target", 25},
+                                                          {"obstacle_pusher", 26},
+                                                          {"obstacle_nearest", 27},
+                                                          {"intrusion", 28},
+                                                          {"collision", 29}}));
+  EXPECT_EQ(sut.controller.control.many_iterations, 24);
+  EXPECT_EQ(sut.controller.control.few_iterations, 25);
+  EXPECT_EQ(sut.controller.control.deviation_threshold, 26);
+  EXPECT_EQ(sut.controller.control.initial_steps, 27);
+  EXPECT_EQ(sut.controller.control.straight_speed, 0.28);
+  EXPECT_EQ(sut.controller.control.few_iterations_max, 30);
+  EXPECT_EQ(sut.controller.control.obstruction_patience, 31);
+  EXPECT_EQ(sut.controller.control.timeout, std::chrono::milliseconds(29500));
+  EXPECT_FALSE(sut.controller.control.close_hand);
+  EXPECT_EQ(sut.controller.mpc.horizon, 32);
+  EXPECT_EQ(sut.controller.mpc.first_iterations, 33);
+  EXPECT_EQ(sut.controller.mpc.iterations, 34);
+  EXPECT_EQ(sut.controller.mpc.max_actions, 35);
+  EXPECT_EQ(sut.controller.mpc.straight_speed, 0.36);
+  EXPECT_EQ(sut.controller.mpc.step_duration, 0.5);
+  EXPECT_EQ(sut.controller.mpc.timeout, std::chrono::milliseconds(29500));
 }
 
 // experiments/pushing.yaml says what the code's defaults of pushing are.
@@ -122,8 +139,8 @@ TEST(Parameters, OfPushingAreThoseOfTheCode) {
   EXPECT_EQ(got.update, wanted.update);
   EXPECT_EQ(got.min_steps, wanted.min_steps);
   EXPECT_EQ(got.step_duration, wanted.step_duration);
-  EXPECT_EQ(std::memcmp(&got.objective, &wanted.objective, sizeof wanted.objective), 0);
-  const planners::MpcOptions &mpc = result->mpc, defaults;
+  EXPECT_EQ(got.objective, wanted.objective);
+  const planners::MpcOptions &mpc = result->controller.mpc, defaults;
   EXPECT_EQ(mpc.horizon, defaults.horizon);
   EXPECT_EQ(mpc.first_iterations, defaults.first_iterations);
   EXPECT_EQ(mpc.iterations, defaults.iterations);
@@ -164,10 +181,10 @@ const std::vector<Case> kCases{
     {"WrongType", "planner:\n  rollouts: many\n", {"p.yaml:2", "planner.rollouts", "'many'", "a whole number"}},
     {"ThreeSigmas",
      "planner: {sigma: [1, 2, 3]}\n",
-     {"p.yaml", "planner.sigma", "got 3 numbers", "4 for a gripper or 2 for a pusher"}},
+     {"p.yaml", "planner.sigma", "got 3 numbers", "4 of planner.limit", "one of each for every axis"}},
     {"LimitsOfAnotherRobot",
      "planner: {sigma: [1, 2]}\n",
-     {"p.yaml", "planner.limit", "got 4 numbers", "of sigma and limit alike"}},
+     {"p.yaml", "planner.sigma", "got 2 numbers", "4 of planner.limit"}},
     {"NoHorizon", "mpc: {horizon: 0}\n", {"p.yaml", "mpc.horizon", "got 0", "1 to"}},
     {"NoActions", "mpc: {max_actions: 0}\n", {"p.yaml", "mpc.max_actions", "got 0", "1 to"}},
     {"UnknownMpcKey", "mpc: {steps: 3}\n", {"p.yaml:1", "mpc.steps", "unknown key", "horizon"}},

@@ -22,13 +22,13 @@ TEST_F(InProcessWorld, RobotReadsItsJointsAndWhetherTheTargetIsInTheHand) {
   SimulatedRobot sut(execution);
   const auto reading = sut.read();
   ASSERT_TRUE(reading);
-  EXPECT_THAT(reading->q, testing::ElementsAre(scene.robot.x, 0, 0, 0.0425, 0.0425));
+  EXPECT_THAT(reading->q, testing::ElementsAre(scene.robot.q[0], 0, 0, 0.0425, 0.0425));
   EXPECT_THAT(reading->v, testing::Each(0.0));
   EXPECT_EQ(reading->object_in_hand, std::optional(false));
 }
 
 TEST_F(InProcessWorld, RobotFeelsTheTargetInTheHand) {
-  scene.robot.x = -0.035;
+  scene.robot.q[0] = -0.035;
   world = std::move(physics_pool::World::compile(scene)).value();
   physics_pool::ExecutionWorld near(world, 0.0, 1);
   SimulatedRobot sut(near);
@@ -41,7 +41,7 @@ TEST(InProcessPush, PusherHasTwoJointsAndFeelsNothing) {
   SimulatedRobot sut(execution);
   const auto reading = sut.read();
   ASSERT_TRUE(reading);
-  EXPECT_THAT(reading->q, testing::ElementsAre(scene.robot.x, scene.robot.y));
+  EXPECT_THAT(reading->q, testing::ElementsAre(scene.robot.q[0], scene.robot.q[1]));
   EXPECT_EQ(reading->object_in_hand, std::nullopt);
   EXPECT_FALSE(sut.execute(std::vector{0.1, 0.0, 0.0, 0.0}, 0.1, {}));
   EXPECT_TRUE(sut.execute(std::vector{0.1, 0.0}, 0.1, {}));

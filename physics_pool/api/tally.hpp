@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "physics_pool/api/rollout.hpp"
-#include "physics_pool/objective/terms.hpp"
+#include "physics_pool/objective/scorer.hpp"
 
 namespace jostle::physics_pool {
 
@@ -20,8 +20,8 @@ class Tally {
   Tally(const TaskGeometry& geometry, const RolloutBatch& batch, const ControlSequence& controls,
         RolloutOutcome& outcome);
 
-  /// The next control step ended in x. How the rollout ends, if it does so there.
-  std::optional<End> count(const State& x);
+  /// The next control step ended in x, and facts say what happened on the way. How the rollout ends, if it does so there.
+  std::optional<End> count(const State& x, const StepFacts& facts = {});
 
   /// Closes the outcome: cost, steps, and the trajectory if it is worth its way.
   void close(End end);
@@ -34,6 +34,7 @@ class Tally {
   const RolloutBatch& batch_;
   const ControlSequence& controls_;
   RolloutOutcome& outcome_;
+  Scorer scorer_;
   double sum_ = 0.0;
 };
 

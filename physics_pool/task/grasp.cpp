@@ -1,0 +1,53 @@
+// Bring the target into the hand (Ch. 3).
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics_pool/task/kinds.hpp"
+#include "physics_pool/task/task_geometry.hpp"
+
+namespace jostle::physics_pool {
+namespace {
+
+std::string misfit(const Scene& scene) {
+  if (scene.robot.model.hand) return "";
+  return fmt::format("got 'grasp' for the robot '{}', which has no hand; wanted one that has, or another task",
+                     scene.robot.model.name);
+}
+
+// c_g(x) = d_T^2 + w_phi·phi_T^2, Fig. 3.2.
+double cost(const TaskGeometry& geometry, const State& x, double angle_weight) {
+  const TargetBearing bearing = target_bearing(geometry, x);
+  return bearing.distance * bearing.distance + angle_weight * bearing.angle * bearing.angle;
+}
+
+double distance(const TaskGeometry& geometry, const State& x) { return target_bearing(geometry, x).distance; }
+
+// The target's centre is in the pre-grasp region.
+bool reached(const TaskGeometry& geometry, const State& x) {
+  const Hand& hand = *geometry.robot.hand;
+  const StateView view = geometry.view(x);
+  const std::span<const double> q = view.joints();
+  const InTool p = in_tool(geometry, x, view.target().position());
+  return p.forward >= hand.near && p.forward <= hand.far &&
+         p.left <= std::min(hand.side, q[static_cast<std::size_t>(hand.left)]) &&
+         p.left >= -std::min(hand.side, q[static_cast<std::size_t>(hand.right)]);
+}
+
+std::string failure(const TaskGeometry&, const State&) { return ""; }
+
+}  // namespace
+
+constexpr TaskKind kGrasp{.name = "grasp",
+                          .purpose = "bring the target into the hand (Ch. 3)",
+                          .achieved = "target grasped",
+                          .has_goal = false,
+                          .misfit = misfit,
+                          .cost = cost,
+                          .distance = distance,
+                          .reached = reached,
+                          .failure = failure};
+
+}  // namespace jostle::physics_pool

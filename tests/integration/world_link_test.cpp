@@ -177,6 +177,7 @@ TEST_F(SimulatedWorldProcess, RefusesBadCommandsByFieldAndTakesTheNextGoodOne) {
     ASSERT_TRUE(refusal) << sim->err();
     EXPECT_THAT(refusal->error(), HasSubstr(fmt::format("command {}: {}", number, problem)));
     EXPECT_EQ(refusal->q(), before->q());
+    EXPECT_EQ(refusal->sequence_number(), number);  // nobody waits for it any longer
     commands.write(command(5, ++number));
     const auto after = finished(5, number);
     ASSERT_TRUE(after) << sim->err();

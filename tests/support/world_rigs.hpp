@@ -22,7 +22,7 @@
 #include "tests/support/kinematic_world.hpp"
 #include "tests/support/program_process.hpp"
 #include "tests/support/scenes.hpp"
-#include "tests/support/worker_process.hpp"
+#include "tests/support/test_domain.hpp"
 
 namespace jostle::tests {
 

@@ -102,7 +102,7 @@ class GraspingStudyRun : public StudyRun {
 
   const Loaded sut = study(&read_grasping_study,
                            "planner: {rollouts: 2}\n"
-                           "control: {many_iterations: 3, few_iterations: 1, few_iterations_max: 2, timeout: 50}\n",
+                           "control: {many_iterations: 3, few_iterations: 1, few_iterations_max: 2, timeout: 600}\n",
                            R"(
 title: tiny grasping
 parameters: parameters.yaml

@@ -111,6 +111,69 @@ TEST_F(MadeUpWorld, OnlyBadRobotStatesAreAnErrorThatNamesTheField) {
   EXPECT_THAT(robot_result.error().message, HasSubstr("rt/robot/status: q[1]: got nan"));
 }
 
+// Two commands to a robot that refuses the first and repeats that until the second is done.
+TEST_F(MadeUpWorld, RefusalIsOfOneCommandOnly) {
+  wire::Inbox<VelocityCommand> commands{participant, wire::topics::kRobotCommand, 64};
+  const std::jthread other_side([&](std::stop_token stop) {
+    RobotStatus status;
+    status.q({0.0, 0.0});
+    status.v({0.0, 0.0});
+    int repeats = 0;
+    soon(kPatience, [&] {
+      for (const VelocityCommand& command : commands.take_all()) {
+        status.epoch(command.epoch());
+        if (command.sequence_number() == 1) status.error("command 1: too early");
+        if (command.sequence_number() == 2) repeats = 10;
+      }
+      if (repeats > 0 && --repeats == 0) {
+        status.error("");
+        status.sequence_number(2);
+      }
+      return !status_writer.write(status) || stop.stop_requested();
+    });
+  });
+  const std::vector<double> u{0.1, 0.0};
+
+  const auto first = robot.execute(u, 0.1, {}), second = robot.execute(u, 0.1, {});
+
+  ASSERT_FALSE(first);
+  EXPECT_EQ(first.error().code, Code::kInvalidArgument);
+  EXPECT_THAT(first.error().message, HasSubstr("command 1: too early"));
+  EXPECT_TRUE(second) << second.error().message;
+}
+
+// A robot that does not say that it stopped.
+TEST_F(MadeUpWorld, StopThatIsNotObeyedIsAnError) {
+  wire::Inbox<VelocityCommand> commands{participant, wire::topics::kRobotCommand, 64};
+  std::stop_source stop_action;
+  std::vector<VelocityCommand> heard;
+  Result<void> ok;
+  {
+    const std::jthread other_side([&](std::stop_token stop) {
+      RobotStatus status;
+      status.q({0.0, 0.0});
+      status.v({0.0, 0.0});
+      soon(kPatience, [&] {
+        for (const VelocityCommand& command : commands.take_all()) {
+          heard.push_back(command);
+          status.epoch(command.epoch());
+          status.busy(true);
+          stop_action.request_stop();
+        }
+        return !status_writer.write(status) || stop.stop_requested();
+      });
+    });
+    ok = robot.execute(std::vector{0.1, 0.0}, 0.1, stop_action.get_token());
+  }
+
+  ASSERT_FALSE(ok);
+  EXPECT_EQ(ok.error().code, Code::kUnavailable);
+  EXPECT_THAT(ok.error().message, HasSubstr("told to stop, and not heard to stand still"));
+  ASSERT_EQ(heard.size(), 2u);
+  EXPECT_TRUE(world::is_stop(heard[1]));
+  EXPECT_EQ(heard[1].sequence_number(), 2u);
+}
+
 // jostle_sim, commanded by hand.
 class SimulatedWorldProcess : public WorldLink {
  protected:
@@ -177,6 +240,7 @@ TEST_F(SimulatedWorldProcess, RefusesBadCommandsByFieldAndTakesTheNextGoodOne) {
     ASSERT_TRUE(refusal) << sim->err();
     EXPECT_THAT(refusal->error(), HasSubstr(fmt::format("command {}: {}", number, problem)));
     EXPECT_EQ(refusal->q(), before->q());
+    EXPECT_EQ(refusal->sequence_number(), number);  // nobody waits for it any longer
     commands.write(command(5, ++number));
     const auto after = finished(5, number);
     ASSERT_TRUE(after) << sim->err();

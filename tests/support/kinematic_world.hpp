@@ -11,6 +11,7 @@
 #include "physics_pool/objective/terms.hpp"
 #include "planners/api/planner.hpp"
 #include "robot_bridge/api/robot.hpp"
+#include "robot_bridge/safety/command_check.hpp"
 #include "tests/support/planar.hpp"
 
 namespace jostle::tests {
@@ -39,6 +40,8 @@ class KinematicRobot final : public robot_bridge::Robot {
 
   Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override {
     if (execute_error) return *execute_error;
+    const int axes = joints_ == kPusherJoints ? kPusherAxes : kGripperAxes;
+    if (auto ok = robot_bridge::check_command(u, axes, duration); !ok) return ok;
     if (stop.stop_requested()) return Error{Code::kCancelled, "robot: cancelled"};
     executed.emplace_back(u.begin(), u.end());
     durations.push_back(duration);

@@ -1,47 +1,20 @@
 #pragma once
 /// \file
-/// Real worker processes, and the corner of the network they live in.
+/// Real worker processes.
 
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
-#include <functional>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
-#include "services/common/process/domain_claim.hpp"
+#include "tests/support/test_domain.hpp"
 
 namespace jostle::tests {
-
-using Clock = std::chrono::steady_clock;
-
-/// A deadline `time` from now.
-template <class Duration>
-Clock::time_point in(Duration time) {
-  return Clock::now() + time;
-}
-
-/// A DDS domain that no other test process on this machine uses; held until this one ends.
-inline int test_domain() {
-  static const auto own_result = common::claim_some_domain();
-  if (!own_result) throw std::runtime_error(own_result.error().message);
-  return own_result->domain;
-}
-
-/// Whether a condition came true by the deadline.
-inline bool eventually(Clock::time_point deadline, const std::function<bool()>& condition) {
-  while (!condition()) {
-    if (Clock::now() >= deadline) return false;
-    std::this_thread::yield();
-  }
-  return true;
-}
 
 /// One jostle_worker, killed at the end of its scope.
 class WorkerProcess {

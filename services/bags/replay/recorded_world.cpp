@@ -1,5 +1,6 @@
 #include "services/bags/replay/recorded_world.hpp"
 
+#include "robot_bridge/safety/command_check.hpp"
 #include "services/common/process/program.hpp"
 
 namespace jostle::bags {
@@ -11,11 +12,14 @@ double RecordedWorld::time() const { return world::seconds(run_.observations[at_
 
 Result<world::Seen> RecordedWorld::seen() const { return world::from_message(run_.observations[at_]); }
 
-Result<void> RecordedWorld::advance(std::stop_token stop) {
+Result<void> RecordedWorld::advance(std::span<const double> u, double duration, std::stop_token stop) {
+  if (stop.stop_requested()) return Error{Code::kCancelled, "stopped on request"};
   if (at_ + 1 == run_.observations.size()) {
     over_ = true;
     return Error{Code::kCancelled, "the recording ends here"};
   }
+  const int axes = world::axes_of(run_.observations[at_].q().size()).value_or(static_cast<int>(u.size()));
+  if (auto ok = robot_bridge::check_command(u, axes, duration); !ok) return ok;
   ++at_;
   if (rate_ <= 0) return {};
   const std::chrono::duration<double> since(static_cast<double>(run_.observed[at_] - run_.observed[0]) * 1e-9 / rate_);
@@ -30,8 +34,8 @@ Result<robot_bridge::RobotReading> RecordedWorld::Robot::read() {
   return std::move(seen_result->robot);
 }
 
-Result<void> RecordedWorld::Robot::execute(std::span<const double>, double, std::stop_token stop) {
-  return world_.advance(std::move(stop));
+Result<void> RecordedWorld::Robot::execute(std::span<const double> u, double duration, std::stop_token stop) {
+  return world_.advance(u, duration, std::move(stop));
 }
 
 Result<std::vector<perception::ObjectReading>> RecordedWorld::Objects::read() {

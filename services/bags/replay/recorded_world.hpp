@@ -3,6 +3,8 @@
 /// RecordedWorld: a robot and its objects that do again what they once did.
 
 #include <chrono>
+#include <span>
+#include <stop_token>
 #include <vector>
 
 #include "perception/api/object_source.hpp"
@@ -13,7 +15,7 @@
 namespace jostle::bags {
 
 /// Gives out one recorded observation after the other, whatever it is commanded: the next
-/// one follows a command. After the last there is none, and a command ends with kCancelled.
+/// one follows a command that a robot would take. After the last there is none, and a command ends with kCancelled.
 ///
 /// Threads  one.
 class RecordedWorld {
@@ -29,7 +31,7 @@ class RecordedWorld {
 
  private:
   Result<world::Seen> seen() const;
-  Result<void> advance(std::stop_token stop);
+  Result<void> advance(std::span<const double> u, double duration, std::stop_token stop);
 
   const RecordedRun& run_;
   const double rate_;

@@ -26,7 +26,6 @@ constexpr double kMiB = 1024.0 * 1024.0;
 // A participant takes 0.6 MiB with default segments (measured); 64 MiB is what
 // containers get, and enough for a machine full of workers.
 constexpr double kEnoughMiB = 60;
-constexpr std::time_t kSettled = 5;  // s; a participant makes its files within milliseconds
 
 // The segment or port a file belongs to, "" if it is not Fast DDS's:
 // sem.fastrtps_port7400_mutex and fastrtps_port7400_el go with fastrtps_port7400.
@@ -41,31 +40,31 @@ std::string owner_of(std::string file) {
 }
 
 // Last word of a line of /proc/PID/maps, if that is a file of the folder.
-void note_mapped(const fs::path& process, std::set<std::string>& used) {
+void note_mapped(const fs::path& process, const fs::path& folder, std::set<std::string>& used) {
   std::ifstream maps(process / "maps");
   for (std::string line; std::getline(maps, line);) {
-    const std::size_t at = line.find(kFolder.string() + "/");
+    const std::size_t at = line.find(folder.string() + "/");
     if (at != std::string::npos) used.insert(fs::path(line.substr(at)).filename().string());
   }
 }
 
-void note_open(const fs::path& process, std::set<std::string>& used) {
+void note_open(const fs::path& process, const fs::path& folder, std::set<std::string>& used) {
   std::error_code ignored;  // processes end while we look, and others' are closed to us
   for (const auto& entry : fs::directory_iterator(process / "fd", ignored)) {
     const fs::path file = fs::read_symlink(entry.path(), ignored);
-    if (file.parent_path() == kFolder) used.insert(file.filename().string());
+    if (file.parent_path() == folder) used.insert(file.filename().string());
   }
 }
 
 // Names of files in the folder that a living process maps or has open.
-std::set<std::string> files_in_use() {
+std::set<std::string> files_in_use(const fs::path& folder) {
   std::set<std::string> used;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator("/proc", ignored)) {
     const std::string name = entry.path().filename().string();
     if (!std::ranges::all_of(name, [](unsigned char c) { return std::isdigit(c) != 0; })) continue;
-    note_mapped(entry.path(), used);
-    note_open(entry.path(), used);
+    note_mapped(entry.path(), folder, used);
+    note_open(entry.path(), folder, used);
   }
   return used;
 }
@@ -80,15 +79,15 @@ bool is_locked(const fs::path& file) {
 }
 
 // Ours to judge: our own or, as root, anyone's; and not just being made.
-bool is_judged(const fs::path& file) {
+bool is_judged(const fs::path& file, std::chrono::seconds settled) {
   struct stat status {};
   if (stat(file.c_str(), &status) != 0) return false;
-  return (geteuid() == 0 || status.st_uid == geteuid()) && std::time(nullptr) - status.st_ctime >= kSettled;
+  return (geteuid() == 0 || status.st_uid == geteuid()) && std::time(nullptr) - status.st_ctime >= settled.count();
 }
 
-bool is_abandoned(const Leftover& candidate, const std::set<std::string>& used) {
+bool is_abandoned(const Leftover& candidate, const std::set<std::string>& used, std::chrono::seconds settled) {
   return std::ranges::all_of(candidate.files, [&](const fs::path& file) {
-    return is_judged(file) && !used.contains(file.filename().string()) && !is_locked(file);
+    return is_judged(file, settled) && !used.contains(file.filename().string()) && !is_locked(file);
   });
 }
 
@@ -100,10 +99,10 @@ double mebibytes(const std::vector<Leftover>& leftovers) {
 
 }  // namespace
 
-std::vector<Leftover> find_leftovers() {
+std::vector<Leftover> find_leftovers(const LeftoverSearch& search) {
   std::map<std::string, Leftover> candidates;
   std::error_code ignored;  // without the folder there are no leftovers
-  for (const auto& entry : fs::directory_iterator(kFolder, ignored)) {
+  for (const auto& entry : fs::directory_iterator(search.folder, ignored)) {
     const std::string name = owner_of(entry.path().filename().string());
     if (name.empty()) continue;
     Leftover& candidate = candidates[name];
@@ -113,9 +112,9 @@ std::vector<Leftover> find_leftovers() {
     if (!ignored) candidate.bytes += size;
   }
   std::vector<Leftover> leftovers;
-  const std::set<std::string> used = files_in_use();
+  const std::set<std::string> used = files_in_use(search.folder);
   for (auto& [name, candidate] : candidates) {
-    if (is_abandoned(candidate, used)) leftovers.push_back(std::move(candidate));
+    if (is_abandoned(candidate, used, search.settled)) leftovers.push_back(std::move(candidate));
   }
   return leftovers;
 }

@@ -2,6 +2,7 @@
 /// \file
 /// Fast DDS's shared memory: room for it, and what killed processes left there.
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -19,12 +20,18 @@ struct Leftover {
   std::uintmax_t bytes = 0;
 };
 
+struct LeftoverSearch {
+  std::filesystem::path folder = "/dev/shm";
+  /// What is younger may be half made; a participant makes its files within milliseconds.
+  std::chrono::seconds settled{5};
+};
+
 /// Looks for segments (fastrtps_…), ports (fastrtps_port…) and data sharing
 /// (fast_datasharing_…). Something is in use when a process maps or has open
 /// any of its files, or holds a lock on one: locks also show processes in other
 /// containers. Files of other users are passed over unless we are root, and so
-/// is whatever is younger than a few seconds, as it may be half made.
-std::vector<Leftover> find_leftovers();
+/// is whatever has not settled.
+std::vector<Leftover> find_leftovers(const LeftoverSearch& search = {});
 
 /// Removes what it can.
 void remove_leftovers(const std::vector<Leftover>& leftovers);

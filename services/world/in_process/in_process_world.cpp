@@ -45,8 +45,9 @@ Result<void> SimulatedRobot::execute(std::span<const double> u, double duration,
 }
 
 Result<std::vector<perception::ObjectReading>> SimulatedObjects::read() {
-  const State seen = physics_pool::observed_state(world_.world().scene(), belief_, world_.state(), next_);
-  next_ = physics_pool::Measurement::kFeedback;
+  using physics_pool::Measurement;
+  const Measurement measurement = world_.time() > 0 ? Measurement::kFeedback : Measurement::kInitial;
+  const State seen = physics_pool::observed_state(world_.world().scene(), belief_, world_.state(), measurement);
   return object_readings(world_.world().geometry().layout, seen);
 }
 

@@ -27,8 +27,8 @@ class SimulatedRobot final : public robot_bridge::Robot {
   physics_pool::ExecutionWorld& world_;
 };
 
-/// Sees the objects of an execution world as observed_state does. The first
-/// reading is the initial measurement.
+/// Sees the objects of an execution world as observed_state does: the initial
+/// measurement until the world has moved.
 class SimulatedObjects final : public perception::ObjectSource {
  public:
   /// `belief`: the planning scene.
@@ -40,7 +40,6 @@ class SimulatedObjects final : public perception::ObjectSource {
  private:
   const physics_pool::ExecutionWorld& world_;
   physics_pool::Scene belief_;
-  physics_pool::Measurement next_ = physics_pool::Measurement::kInitial;
 };
 
 }  // namespace jostle::world

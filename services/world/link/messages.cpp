@@ -160,9 +160,31 @@ tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates&
   return message;
 }
 
+jostle_msgs::msg::VelocityCommand stop_message(std::uint64_t epoch, std::uint64_t sequence_number) {
+  jostle_msgs::msg::VelocityCommand message;
+  message.epoch(epoch);
+  message.sequence_number(sequence_number);
+  return message;
+}
+
+bool is_stop(const jostle_msgs::msg::VelocityCommand& command) {
+  return command.velocities().empty() && command.duration() == 0;
+}
+
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message) {
   if (auto ok = check_finite(message.q(), message.v()); !ok) return ok.error();
   return robot_bridge::RobotReading{.q = message.q(), .v = message.v(), .object_in_hand = message.object_in_hand()};
+}
+
+std::optional<int> axes_of(std::size_t joints) {
+  switch (joints) {
+    case kPusherJoints:
+      return kPusherAxes;
+    case kGripperJoints:
+      return kGripperAxes;
+    default:
+      return {};
+  }
 }
 
 jostle_msgs::msg::Observation to_message(const Seen& seen, double time) {

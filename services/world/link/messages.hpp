@@ -3,6 +3,8 @@
 /// The robot and its objects as messages. Whatever comes from the wire is
 /// checked here before anyone calculates with it.
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,8 +32,15 @@ sensor_msgs::msg::JointState joint_state_message(const StateLayout& layout, cons
 geometry_msgs::msg::PoseArray pose_array_message(const jostle_msgs::msg::ObjectStates& objects);
 tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates& objects);
 
+/// Ends the command at work, and those of its commander that wait (robot.idl).
+jostle_msgs::msg::VelocityCommand stop_message(std::uint64_t epoch, std::uint64_t sequence_number);
+bool is_stop(const jostle_msgs::msg::VelocityCommand& command);
+
 /// Error kInvalidArgument naming the field.
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message);
+
+/// Control axes of a robot that reads so many joints; nothing for neither gripper nor pusher.
+std::optional<int> axes_of(std::size_t joints);
 
 /// What a controller sees at a time.
 struct Seen {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <thread>
+#include <utility>
 
 #include "physics_pool/objective/scorer.hpp"
 #include "robot_bridge/safety/command_check.hpp"
@@ -52,12 +53,31 @@ Result<void> SimulatedWorld::run(std::stop_token stop) {
 }
 
 void SimulatedWorld::receive() {
+  for (const auto& command : std::exchange(waiting_, {})) accept(command);
   for (const auto& command : commands_.take_all()) accept(command);
+}
+
+// While an action is at work: whether its commander has had enough of it.
+bool SimulatedWorld::told_to_stop() {
+  bool told = false;
+  for (auto& command : commands_.take_all()) {
+    told = told || (is_stop(command) && command.epoch() == epoch_ && command.sequence_number() > accepted_);
+    waiting_.push_back(std::move(command));
+    if (waiting_.size() > kCommandQueue) waiting_.pop_front();  // as the inbox does
+  }
+  return told;
 }
 
 void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
   if (command.epoch() < epoch_ || (command.epoch() == epoch_ && command.sequence_number() <= accepted_)) {
     spdlog::warn("command {}/{} is stale ({} so far), dropped", command.epoch(), command.sequence_number(), ++dropped_);
+    return;
+  }
+  if (is_stop(command) && command.epoch() == epoch_) {
+    accepted_ = finished_ = command.sequence_number();
+    actions_.clear();
+    error_.clear();
+    publish();
     return;
   }
   const auto check_result =
@@ -75,6 +95,7 @@ void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
   accepted_ = command.sequence_number();
   if (!check_result) {
     error_ = fmt::format("command {}: {}", command.sequence_number(), check_result.error().message);
+    if (actions_.empty()) finished_ = accepted_;  // nobody waits for an earlier one
     spdlog::warn("{}; refused", error_);
     publish();
     return;
@@ -91,7 +112,7 @@ Result<void> SimulatedWorld::act(const Action& action, std::stop_token stop) {
   world_.begin(action.u);
   const auto start = steady_clock::now();
   for (long i = 0; i < action.steps; ++i) {
-    if (stop.stop_requested()) break;
+    if (stop.stop_requested() || told_to_stop()) break;
     if (options_.rate > 0) {
       const std::chrono::duration<double> due(static_cast<double>(i) * world_.world().time_step() / options_.rate);
       std::this_thread::sleep_until(start + std::chrono::duration_cast<steady_clock::duration>(due));

@@ -33,7 +33,8 @@ struct SimulatedWorldOptions {
 /// Commands carry the commander's epoch and a sequence number; one from an
 /// older epoch or already done is counted and dropped, a bad one is refused in
 /// `RobotStatus.error`. A newer epoch takes over with its first good command.
-/// The robot stands still when no command is at work.
+/// A stop (messages.hpp) ends the command at work at once; everything else waits
+/// for its turn. The robot stands still when no command is at work.
 class SimulatedWorld {
  public:
   SimulatedWorld(const wire::Participant& participant, physics_pool::WorldPtr world,
@@ -51,6 +52,7 @@ class SimulatedWorld {
   };
 
   void receive();
+  bool told_to_stop();
   void accept(const jostle_msgs::msg::VelocityCommand& command);
   Result<void> act(const Action& action, std::stop_token stop);
   Result<void> rest(std::stop_token stop);
@@ -60,10 +62,11 @@ class SimulatedWorld {
   SimulatedWorldOptions options_;
   physics_pool::ExecutionWorld world_;
   physics_pool::Scene belief_;
-  std::vector<double> still_;  // the control that moves nothing
+  std::vector<double> still_;                              // the control that moves nothing
+  std::deque<jostle_msgs::msg::VelocityCommand> waiting_;  // came while an action was at work
   std::deque<Action> actions_;
   std::uint64_t epoch_ = 0;     // of the commander
-  std::uint64_t finished_ = 0;  // its last finished command
+  std::uint64_t finished_ = 0;  // its last finished, stopped or refused command
   std::uint64_t accepted_ = 0;  // its last accepted command
   std::uint64_t dropped_ = 0;   // stale commands
   bool moved_ = false;          // a command was begun

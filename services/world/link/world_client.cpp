@@ -61,6 +61,7 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::stop_token s
     }
     known_ = known_ || status->epoch() == epoch_;
     heard_ = true;
+    joints_ = status->q().size();
     time_ = seconds(status->header());
     return *std::move(status);
   }
@@ -92,9 +93,43 @@ Result<void> RobotClient::wait_for_robot(std::stop_token stop) {
   return {};
 }
 
+Result<void> RobotClient::wait_until_finished(std::stop_token stop) {
+  for (;;) {
+    auto status_result = next_status(stop);
+    if (!status_result) return status_result.error();
+    if (status_result->epoch() != epoch_) continue;
+    const bool finished = status_result->sequence_number() >= sequence_number_;
+    const std::string& error = status_result->error();
+    if (error.empty() || (!finished && error == refusal_)) {  // or an earlier command's
+      if (finished) return {};
+      continue;
+    }
+    refusal_ = error;
+    return Error{Code::kInvalidArgument, "robot: " + error};
+  }
+}
+
+Result<void> RobotClient::halt() {
+  const auto deadline = steady_clock::now() + options_.silence;
+  if (command_.write(stop_message(epoch_, ++sequence_number_))) {
+    while (steady_clock::now() < deadline) {
+      auto status_result = next_status({});
+      if (!status_result) return status_result.error();
+      const bool obeyed = status_result->epoch() == epoch_ && status_result->sequence_number() >= sequence_number_;
+      if (obeyed && !status_result->busy()) return {};
+    }
+  }
+  return Error{Code::kUnavailable, fmt::format("robot: told to stop, and not heard to stand still within {:.1f} s",
+                                               static_cast<double>(options_.silence.count()) / 1e3)};
+}
+
 Result<void> RobotClient::execute(std::span<const double> u, double duration, std::stop_token stop) {
   if (auto ok = robot_bridge::check_command(u, std::vector<double>(u.size(), robot_bridge::kAnySpeed), duration); !ok) return ok;
   if (auto ok = wait_for_robot(stop); !ok) return ok;
+  // Here already: a robot says nothing of a newcomer's bad command.
+  const int axes = axes_of(joints_).value_or(static_cast<int>(u.size()));
+  if (auto ok = robot_bridge::check_command(u, axes, duration); !ok) return ok;
+  if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped before it moved"};
   jostle_msgs::msg::VelocityCommand command;
   command.header(make_header(time_));
   command.epoch(epoch_);
@@ -104,15 +139,10 @@ Result<void> RobotClient::execute(std::span<const double> u, double duration, st
   if (!command_.write(command)) {
     return Error{Code::kUnavailable, "robot: the middleware took no command on " + wire::topics::kRobotCommand.name};
   }
-  for (;;) {
-    auto status_result = next_status(stop);
-    if (!status_result) return status_result.error();
-    if (status_result->epoch() != epoch_) continue;
-    if (!status_result->error().empty()) {
-      return Error{Code::kInvalidArgument, "robot: " + status_result->error()};
-    }
-    if (status_result->sequence_number() >= sequence_number_) return {};
-  }
+  auto ok = wait_until_finished(stop);
+  if (ok || ok.error().code != Code::kCancelled) return ok;
+  if (auto halted = halt(); !halted) return halted;
+  return ok;
 }
 
 ObjectsClient::ObjectsClient(const wire::Participant& participant, const RobotClient& robot,

@@ -4,7 +4,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "perception/api/object_source.hpp"
 #include "robot_bridge/api/robot.hpp"
@@ -22,7 +24,8 @@ struct WorldClientOptions {
   std::chrono::milliseconds start{5000};
 };
 
-/// Commands go to `rt/robot/command`; `rt/robot/status` tells when one is done.
+/// Commands go to `rt/robot/command`; `rt/robot/status` tells when one is done. A stop
+/// request is passed on, and answered with kCancelled once the robot says that it obeyed.
 /// Bad statuses are counted, reported and skipped; only if nothing good follows
 /// are they an error. So is a commander with a newer epoch, whom the robot obeys.
 class RobotClient final : public robot_bridge::Robot {
@@ -42,13 +45,21 @@ class RobotClient final : public robot_bridge::Robot {
   /// Until whoever sends the statuses reads our commands. Anybody else may read them too.
   Result<void> wait_for_robot(std::stop_token stop);
 
+  /// Until the command of sequence_number_ is finished or refused.
+  Result<void> wait_until_finished(std::stop_token stop);
+
+  /// The robot stands still. Error kUnavailable: it does not say so.
+  Result<void> halt();
+
   WorldClientOptions options_;
   wire::Inbox<jostle_msgs::msg::RobotStatus> status_;
   wire::Writer<jostle_msgs::msg::VelocityCommand> command_;
   const std::uint64_t epoch_;
   std::uint64_t sequence_number_ = 0;
+  std::string refusal_;  // the last one heard; it is repeated until the next good command
   bool heard_ = false;
-  bool known_ = false;  // a status has named our epoch
+  std::size_t joints_ = 0;  // of the newest status
+  bool known_ = false;      // a status has named our epoch
   double time_ = 0.0;
   std::uint64_t rejected_ = 0;
 };

@@ -41,5 +41,21 @@ TEST(MedianInterval, OfOneValueIsThatValue) {
   EXPECT_DOUBLE_EQ(interval.high, 2.0);
 }
 
+// Wilson's formula by hand: with none of n the upper bound is z^2/(n + z^2).
+TEST(WilsonInterval, StaysBetweenNoneAndAll) {
+  constexpr double z2 = 1.959964 * 1.959964;
+  for (int n = 1; n <= 100; ++n) {
+    const Share none = wilson_interval(0, n), all = wilson_interval(n, n);
+    EXPECT_GE(none.low, 0.0) << n;
+    EXPECT_NEAR(none.low, 0.0, 1e-12) << n;
+    EXPECT_NEAR(none.high, z2 / (n + z2), 1e-12) << n;
+    EXPECT_NEAR(all.low, n / (n + z2), 1e-12) << n;
+    EXPECT_NEAR(all.high, 1.0, 1e-12) << n;
+    EXPECT_LE(all.high, 1.0) << n;
+  }
+}
+
+TEST(WilsonInterval, OfNoRunsSaysNothing) { EXPECT_EQ(wilson_interval(0, 0).runs, 0); }
+
 }  // namespace
 }  // namespace jostle::common

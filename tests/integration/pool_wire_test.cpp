@@ -2,10 +2,15 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
+
+#include "services/pool/client/remote_pool.hpp"
 #include "services/wire/convert/pool.hpp"
 #include "services/wire/dds/reader.hpp"
 #include "services/wire/dds/topics.hpp"
 #include "tests/support/batches.hpp"
+#include "tests/support/cramped_writer.hpp"
+#include "tests/support/program_process.hpp"
 #include "tests/support/worker_process.hpp"
 
 namespace jostle::tests {
@@ -60,7 +65,7 @@ class PoolWire : public ::testing::Test {
 
   // The first answer to a task; an empty one if none comes.
   TaskResult ask(const Task& task) {
-    tasks->write(task);
+    EXPECT_TRUE(tasks->write(task));
     while (auto result = results.take(in(kPatience))) {
       if (result->epoch() == task.epoch()) return *result;
     }
@@ -161,7 +166,7 @@ TEST_F(PoolWire, TaskWaitsForItsWorld) {
   const Scene late = small_scene(2);
   Task task = good_task();
   task.batch(wire::to_wire(push_batch(late, 2)));
-  tasks->write(task);
+  EXPECT_TRUE(tasks->write(task));
   expect_still_serves();  // a task that waits holds up no other
 
   announce(physics_pool::scene_hash(late), physics_pool::to_yaml(late));
@@ -196,6 +201,32 @@ TEST_F(PoolWire, NonsenseNewsOfABatchAreIgnored) {
     EXPECT_TRUE(controls.write(control));
   }
   expect_still_serves();
+}
+
+TEST(WorkerThatCannotAnswer, SaysSoAndLivesOn) {
+  const TempFolder folder;
+  std::string profiles = contents(JOSTLE_PROGRAMS "/../share/jostle/profiles.xml");
+  profiles.insert(profiles.find("</profiles>"), cramped_writer(wire::topics::kPoolResult.name));
+  const std::string file = folder.write("profiles.xml", profiles);
+  const int domain = test_domain();
+  ProgramProcess worker("jostle_worker", {"--domain", std::to_string(domain)}, folder, {{"JOSTLE_PROFILES", file}});
+  const wire::Participant participant = wire::Participant::open({.domain = domain}).value();
+  pool::RemotePool sut(participant);
+  const Scene scene = small_scene();
+  ASSERT_TRUE(sut.load(scene));
+  ASSERT_TRUE(sut.wait_for_workers(1, in(kPatience))) << worker.err();
+  physics_pool::RolloutBatch batch = push_batch(scene, 1);
+  for (int t = 0; t < 40; ++t) batch.nominal.append(std::array{0.0, 0.0, 0.0, 0.0});
+  batch.want_all_trajectories = true;  // an answer of 15 kB
+  const auto ticket_result = sut.submit(batch, [](const auto&) {});
+  ASSERT_TRUE(ticket_result);
+
+  EXPECT_TRUE(worker.says("results were not taken by the middleware", kPatience)) << worker.err();
+
+  // The client has it run again and again; other batches are served beside it.
+  const auto small = sut.run(wait_batch(scene, 2, 0ns), in(kPatience));
+  ASSERT_TRUE(small) << small.error().message;
+  EXPECT_EQ((*ticket_result)->missing(), 1u);
 }
 
 }  // namespace

@@ -234,8 +234,15 @@ void RemotePool::connect(const std::vector<WorkerId>& workers) {
 }
 
 void RemotePool::send(const Outgoing& outgoing) {
-  for (const Control& message : outgoing.controls) control_writer_.write(message);
-  for (const auto& [worker, task] : outgoing.tasks) task_writers_.at(worker).write(task);
+  // News saves work and decides nothing: without it workers simulate what nobody needs any more.
+  for (const Control& message : outgoing.controls) (void)control_writer_.write(message);
+  for (const auto& [worker, task] : outgoing.tasks) {
+    if (task_writers_.at(worker).write(task)) continue;
+    // Its samples are sent again once the worker's heartbeats say that they are not there.
+    const std::lock_guard lock(mutex_);
+    last_refusal_ =
+        fmt::format("worker {:016x}: the middleware did not take {} samples for it", worker, task.samples().size());
+  }
 }
 
 void RemotePool::absorb_heartbeats(wire::TimePoint now, std::vector<WorkerId>& strangers) {

@@ -1,6 +1,7 @@
 #include "services/pool/worker/worker_service.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +24,7 @@ namespace {
 constexpr std::chrono::seconds kWorldPatience{5};  // a latched text arrives in milliseconds
 constexpr std::chrono::milliseconds kRetry{20};    // while a world is waited for
 constexpr std::size_t kArrivals = 1024;            // unread tasks; credit keeps honest clients far below
+constexpr std::chrono::seconds kComplaints{1};     // between two log lines about losses
 constexpr std::size_t kCancelled = 64;             // cancelled batches remembered
 
 std::int64_t nanoseconds(std::chrono::steady_clock::time_point time) {
@@ -166,8 +168,9 @@ void WorkerService::refuse(const Task& task, const Error& error) {
   result.sample(task.samples().empty() ? task.batch().first_sample() : task.samples().front());
   result.error(error.message);
   result.error_code(static_cast<std::uint8_t>(error.code));
-  result_writer_.write(result);
+  const bool sent = result_writer_.write(result);
   const std::lock_guard lock(mutex_);
+  if (!sent) ++lost_results_;
   loads_[task.client()] -= static_cast<std::uint32_t>(task.samples().size());
 }
 
@@ -189,6 +192,7 @@ void WorkerService::feed() {
 void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, const physics_pool::Shift& shift) {
   const bool skipped =
       outcome.end == physics_pool::End::kSkipped;  // cancelled, or the client knows of the success that did it
+  bool sent = true;
   std::unique_lock lock(mutex_);
   const Held held = release(batch, outcome.sample);
   lock.unlock();
@@ -203,9 +207,10 @@ void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, 
     result.started(nanoseconds(shift.started));
     result.finished(nanoseconds(shift.finished));
     result.thread(static_cast<std::uint32_t>(shift.thread));
-    result_writer_.write(result);
+    sent = result_writer_.write(result);
   }
   lock.lock();
+  if (!sent) ++lost_results_;
   --loads_[batch.first];  // after the answer: a client may trust "nothing of yours is here"
   ++rollouts_;
   engine_steps_ += outcome.engine_steps;
@@ -252,11 +257,26 @@ void WorkerService::beat(std::stop_token stop) {
   do {
     const std::vector<std::uint64_t> clients = result_writer_.matched_participants();
     drop_lost_clients(clients);
-    heartbeat_writer_.write(heartbeat(clients));
+    (void)heartbeat_writer_.write(heartbeat(clients));  // the next one comes soon; five lost ones make us dead
+    say_losses();
   } while (common::pause_until(std::chrono::steady_clock::now() + kHeartbeatPeriod, stop));
   msg::WorkerHeartbeat leave = heartbeat({});
   leave.capacity(0);
-  heartbeat_writer_.write(leave);
+  (void)heartbeat_writer_.write(leave);  // politeness: our silence says the same, later
+}
+
+// On this thread, not where they happen: a log may block.
+void WorkerService::say_losses() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_complaint_) return;
+  std::unique_lock lock(mutex_);
+  const std::uint64_t lost_results = lost_results_;
+  lock.unlock();
+  if (lost_results == said_lost_results_) return;
+  spdlog::warn("{}: {} results were not taken by the middleware and are lost; their samples will be run again", name_,
+               lost_results - said_lost_results_);
+  said_lost_results_ = lost_results;
+  next_complaint_ = now + kComplaints;
 }
 
 void WorkerService::drop_lost_clients(const std::vector<std::uint64_t>& clients) {

@@ -34,7 +34,8 @@ struct WorkerOptions {
 ///          physics is still heard.
 /// Failure  a bad task is answered with an error that names the field; a task
 ///          whose world does not arrive in 5 s likewise. A client that is gone
-///          has its samples dropped.
+///          has its samples dropped. A result that the middleware does not take is lost
+///          and counted; its client sends the sample again, or to another worker.
 class WorkerService {
  public:
   WorkerService(const wire::Participant& participant, const WorkerOptions& options);
@@ -78,6 +79,7 @@ class WorkerService {
   void obey(const jostle_msgs::msg::BatchControl& control);
   void cancel(const BatchId& batch);
   void beat(std::stop_token stop);
+  void say_losses();
   void drop_lost_clients(const std::vector<std::uint64_t>& clients);
   jostle_msgs::msg::WorkerHeartbeat heartbeat(const std::vector<std::uint64_t>& clients) const;
 
@@ -97,7 +99,12 @@ class WorkerService {
   int dealt_ = 0;                                 // samples with the executor: one per busy thread
   std::uint64_t rollouts_ = 0;
   std::uint64_t engine_steps_ = 0;
+  std::uint64_t lost_results_ = 0;  // that the middleware did not take
   bool kicked_ = false;
+
+  // Of the heart alone.
+  std::uint64_t said_lost_results_ = 0;
+  TimePoint next_complaint_;
 
   wire::Writer<jostle_msgs::msg::TaskResult> result_writer_;
   wire::Writer<jostle_msgs::msg::WorkerHeartbeat> heartbeat_writer_;

@@ -19,6 +19,8 @@ using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kFeedbackPeriod{100};
 constexpr std::size_t kGoalQueue = 8;
+constexpr std::chrono::seconds kAnswerPatience{2};  // for the middleware to take a result
+constexpr std::chrono::milliseconds kAnswerPause{50};
 
 const char* word(planners::Phase phase) {
   switch (phase) {
@@ -50,6 +52,15 @@ Rollouts since(const Rollouts& before, Rollouts now) {
   }
   std::erase_if(now, [](const auto& entry) { return entry.second == 0; });
   return now;
+}
+
+// For what a bag of the run cannot do without. The task itself goes on: a robot does not stop because
+// a recording has a gap.
+template <class T>
+void tell(wire::Writer<T>& writer, const T& message, const std::string& what) {
+  if (!writer.write(message)) {
+    spdlog::warn("{} is lost: the middleware did not take it; a recording of this run cannot be replayed", what);
+  }
 }
 
 // What the asker puts into result.json and draws.
@@ -143,24 +154,41 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
     }
   }
   spdlog::info("goal {}: {} {}", goal.goal_id(), result.reason(), result.error());
-  result_writer_.write(result);
+  answer(result, stop);
   const std::lock_guard lock(mutex_);
   goal_id_.clear();
   feedback_.goal_id("");
   feedback_.phase("idle");
 }
 
+// The asker waits for nothing else, so this is tried more than once.
+void Coordinator::answer(const jostle_msgs::msg::GoalResult& result, std::stop_token stop) {
+  const auto deadline = steady_clock::now() + kAnswerPatience;
+  while (!result_writer_.write(result)) {
+    if (steady_clock::now() < deadline && common::pause_until(steady_clock::now() + kAnswerPause, stop)) continue;
+    spdlog::error("goal {}: its result is lost: the middleware did not take it within {} s; it was: {} {}",
+                  result.goal_id(), kAnswerPatience.count(), result.reason(), result.error());
+    return;
+  }
+}
+
 Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task, std::stop_token stop) {
   const physics_pool::TaskGeometry& geometry = task.geometry();
   world::RobotClient robot(participant_);
   world::ObjectsClient objects(participant_, robot);
-  run_writer_.write(describe_run(goal));
+  const std::string goal_text = fmt::format("goal {}: ", goal.goal_id());
+  tell(run_writer_, describe_run(goal), goal_text + "its beginning");
   const Task::Watch watch{
       .on_event = [&](const planners::ControlEvent& event) { note(event, geometry); },
       .on_progress = [&](const planners::Progress& progress) { note(progress, geometry); },
       .journal = {.on_observation =
-                      [this](const jostle_msgs::msg::Observation& seen) { observation_writer_.write(seen); },
-                  .on_plan = [this](const jostle_msgs::msg::Plan& plan) { plan_writer_.write(plan); }},
+                      [&](const jostle_msgs::msg::Observation& seen) {
+                        tell(observation_writer_, seen, fmt::format("{}observation {}", goal_text, seen.number()));
+                      },
+                  .on_plan =
+                      [&](const jostle_msgs::msg::Plan& plan) {
+                        tell(plan_writer_, plan, fmt::format("{}plan {}", goal_text, plan.number()));
+                      }},
       .time = [&] { return robot.time(); }};
   return task.perform(robot, objects, watch, std::move(stop));
 }
@@ -176,7 +204,7 @@ void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
       const std::lock_guard lock(mutex_);
       refusal.error(fmt::format("coordinator: busy with goal {}; cancel it or wait", goal_id_));
     }
-    result_writer_.write(refusal);
+    answer(refusal, stop);
   }
 }
 
@@ -223,7 +251,7 @@ void Coordinator::publish_feedback(std::stop_token stop) {
       report.engine_steps(worker.engine_steps);
       feedback.workers().push_back(std::move(report));
     }
-    feedback_writer_.write(feedback);
+    (void)feedback_writer_.write(feedback);  // the next one comes in 100 ms
   } while (common::pause_until(steady_clock::now() + kFeedbackPeriod, stop));
 }
 

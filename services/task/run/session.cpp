@@ -164,7 +164,7 @@ Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
       cancelled = Clock::now();
       jostle_msgs::msg::Cancel cancel;
       cancel.goal_id(goal_id_);
-      cancel_.write(cancel);
+      (void)cancel_.write(cancel);  // if it is lost, the coordinator is ended after kCancelPatience
     }
     if (cancelled && (!sent_ || Clock::now() - *cancelled > kCancelPatience)) {
       return Error{Code::kCancelled, "interrupted"};
@@ -224,9 +224,12 @@ Result<void> Session::send_goal() {
   goal.predictor(options_.predictor);
   goal.seed(options_.seed);
   goal.plan_only(options_.plan_only);
-  goal_.write(goal);
-  sent_ = true;
-  return {};
+  sent_ = goal_.write(goal);
+  if (sent_ || Clock::now() < goal_deadline_) return {};  // tried again at the next tick
+  return Error{Code::kUnavailable,
+               fmt::format("the goal could not be sent within {} s: the middleware did not take it; profiles that "
+                           "limit {} may be the reason",
+                           kStart.count(), wire::topics::kTaskGoal.name)};
 }
 
 Result<void> Session::look_after() {

@@ -132,11 +132,12 @@ void SimulatedWorld::publish() {
       physics_pool::observed_state(world_.world().scene(), belief_, truth,
                                    moved_ ? physics_pool::Measurement::kFeedback : physics_pool::Measurement::kInitial);
   const auto objects = to_message(object_readings(geometry.layout, seen), time);
-  objects_.write(objects);
-  poses_.write(pose_array_message(objects));
-  transforms_.write(transform_message(objects));
+  // States: when one is lost, the next one follows within kPublicationPeriod and says as much.
+  (void)objects_.write(objects);
+  (void)poses_.write(pose_array_message(objects));
+  (void)transforms_.write(transform_message(objects));
   const auto joints = joint_state_message(geometry.layout, truth, time);
-  joints_.write(joints);
+  (void)joints_.write(joints);
 
   jostle_msgs::msg::RobotStatus status;
   status.header(make_header(time));
@@ -147,7 +148,7 @@ void SimulatedWorld::publish() {
   status.error(error_);
   status.q(joints.position());
   status.v(joints.velocity());
-  status_.write(status);  // last: who sees a command finished finds its objects sent
+  (void)status_.write(status);  // last: who sees a command finished finds its objects sent
 }
 
 }  // namespace jostle::world

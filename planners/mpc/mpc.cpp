@@ -76,27 +76,27 @@ class Run {
     Outcome& outcome = execution_.outcome();
     const physics_pool::TaskGeometry& geometry = setup_.geometry;
     if (!outcome.dropped.empty()) {
-      outcome.reason = fmt::format("dropped {}", fmt::join(outcome.dropped, ", "));
+      outcome.conclude(Ending::kFailed, fmt::format("dropped {}", fmt::join(outcome.dropped, ", ")));
     } else if (physics_pool::target_hits_obstacle(geometry, x())) {
-      outcome.reason = "target hit the obstacle";
+      outcome.conclude(Ending::kFailed, "target hit the obstacle");
     } else if (physics_pool::pusher_hits_obstacle(geometry, x())) {
-      outcome.reason = "pusher hit the obstacle";
+      outcome.conclude(Ending::kFailed, "pusher hit the obstacle");
     } else if (const auto inside = physics_pool::intruders(geometry, x()); !inside.empty()) {
-      outcome.reason = fmt::format("{} in the goal region", names_of(execution_.layout(), inside));
+      outcome.conclude(Ending::kFailed, fmt::format("{} in the goal region", names_of(execution_.layout(), inside)));
     } else if (physics_pool::at_goal(geometry, x(), setup_.objective)) {
-      outcome.success = true;
-      outcome.reason = "target in the goal region";
+      outcome.conclude(Ending::kSucceeded, "target in the goal region");
     } else if (outcome.actions >= options_.max_actions) {
-      outcome.reason = fmt::format("not in the goal region after {} actions", outcome.actions);
+      outcome.conclude(Ending::kFailed, fmt::format("not in the goal region after {} actions", outcome.actions));
     }
-    return !outcome.reason.empty();
+    return outcome.is_over();
   }
 
   Result<void> conclude_plan() {
-    Outcome& outcome = execution_.outcome();
-    outcome.success = execution_.plan().at_goal;
-    outcome.reason = outcome.success ? "plan reaches the goal region; not executed"
-                                     : "plan does not reach the goal region; not executed";
+    if (execution_.plan().at_goal) {
+      execution_.outcome().conclude(Ending::kSucceeded, "plan reaches the goal region; not executed");
+    } else {
+      execution_.outcome().conclude(Ending::kFailed, "plan does not reach the goal region; not executed");
+    }
     return {};
   }
 

@@ -279,6 +279,7 @@ TEST_F(CoordinatorProcess, AnswersBadGoalsWithTheFieldAndGoesOnServing) {
     const GoalResult result = result_of(bad.goal_id());
 
     EXPECT_FALSE(result.success());
+    EXPECT_EQ(result.ending(), GoalResult_Constants::BROKEN);
     EXPECT_THAT(result.error(), HasSubstr(field));
     EXPECT_EQ(result.report(), "");
   }
@@ -286,6 +287,7 @@ TEST_F(CoordinatorProcess, AnswersBadGoalsWithTheFieldAndGoesOnServing) {
   const GoalResult result = result_of("good");
   EXPECT_EQ(result.error(), "");
   EXPECT_TRUE(result.success()) << result.reason();
+  EXPECT_EQ(result.ending(), GoalResult_Constants::SUCCEEDED);
 }
 
 TEST_F(CoordinatorProcess, BelievedWorldOfOtherObjectsIsAnErrorThatNamesThem) {
@@ -308,6 +310,7 @@ TEST_F(CoordinatorProcess, RefusesASecondGoalWhileBusyAndObeysCancel) {
   const GoalResult refusal = result_of("second");
 
   EXPECT_FALSE(refusal.success());
+  EXPECT_EQ(refusal.ending(), GoalResult_Constants::REFUSED);
   EXPECT_THAT(refusal.error(), HasSubstr("busy with goal first"));
 
   Cancel cancel;
@@ -315,7 +318,7 @@ TEST_F(CoordinatorProcess, RefusesASecondGoalWhileBusyAndObeysCancel) {
   EXPECT_TRUE(cancels.write(cancel));
   cancel.goal_id("first");
   EXPECT_TRUE(cancels.write(cancel));
-  EXPECT_EQ(result_of("first").reason(), "cancelled");
+  EXPECT_EQ(result_of("first").ending(), GoalResult_Constants::CANCELLED);
 
   EXPECT_TRUE(goals.write(goal("third")));
   EXPECT_TRUE(result_of("third").success());

@@ -22,7 +22,9 @@ std::optional<std::string> definition_of(const std::string& type);
 /// All of those types, sorted.
 std::vector<std::string> known_types();
 
-/// The same from IDL: modules of modules of structs, as idl/msg has them; by type.
+/// The same from IDL: modules of modules of structs, as idl/msg has them; by type. A module
+/// `Name_Constants` of `const TYPE NAME = VALUE;` holds the constants of the struct `Name`, as ROS 2
+/// writes them.
 /// Error kInvalidArgument with file name and line.
 Result<std::map<std::string, std::string>> definitions_of_idl(
     const std::vector<std::pair<std::string_view, std::string_view>>& files);

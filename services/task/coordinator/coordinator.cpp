@@ -44,6 +44,18 @@ Rollouts rollouts_of(const physics_pool::PoolStatus& pool) {
   return rollouts;
 }
 
+std::uint8_t on_the_wire(planners::Ending ending) { return static_cast<std::uint8_t>(ending); }
+
+namespace endings = jostle_msgs::msg::GoalResult_Constants;
+using planners::Ending;
+static_assert(endings::UNKNOWN == static_cast<int>(Ending::kUnknown) &&
+              endings::SUCCEEDED == static_cast<int>(Ending::kSucceeded) &&
+              endings::FAILED == static_cast<int>(Ending::kFailed) &&
+              endings::TIMED_OUT == static_cast<int>(Ending::kTimedOut) &&
+              endings::CANCELLED == static_cast<int>(Ending::kCancelled) &&
+              endings::BROKEN == static_cast<int>(Ending::kBroken) &&
+              endings::REFUSED == static_cast<int>(Ending::kRefused));
+
 // What they did meanwhile; without those that did nothing.
 Rollouts since(const Rollouts& before, Rollouts now) {
   for (auto& [name, count] : now) {
@@ -67,6 +79,7 @@ void tell(wire::Writer<T>& writer, const T& message, const std::string& what) {
 std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::uint64_t seed, const Rollouts& used) {
   const planners::Plan& plan = outcome.first_plan;
   nlohmann::json report{{"success", outcome.success},
+                        {"ending", to_string(outcome.ending)},
                         {"reason", outcome.reason},
                         {"scene_hash", to_string(scene)},
                         {"seed", seed},
@@ -143,13 +156,16 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
     auto outcome_result =
         task_result ? perform(goal, *task_result, cancelled) : Result<planners::Outcome>(task_result.error());
     if (outcome_result) {
+      result.ending(on_the_wire(outcome_result->ending));
       result.success(outcome_result->success);
       result.reason(outcome_result->reason);
       result.report(report_of(*outcome_result, physics_pool::scene_hash(task_result->execution_scene()), goal.seed(),
                               since(before, rollouts_of(pool_.status()))));
     } else {
       const Error& error = outcome_result.error();
-      result.reason(error.code == Code::kCancelled ? "cancelled" : "the system failed");
+      const bool was_cancelled = error.code == Code::kCancelled;
+      result.ending(on_the_wire(was_cancelled ? planners::Ending::kCancelled : planners::Ending::kBroken));
+      result.reason(was_cancelled ? "cancelled" : "the system failed");
       result.error(error.message);
     }
   }
@@ -199,6 +215,7 @@ void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
     if (!goal) continue;
     jostle_msgs::msg::GoalResult refusal;
     refusal.goal_id(goal->goal_id());
+    refusal.ending(on_the_wire(planners::Ending::kRefused));
     refusal.reason("refused");
     {
       const std::lock_guard lock(mutex_);

@@ -165,6 +165,7 @@ TEST_F(MpcTest, EndsWhenTheTargetIsInTheGoalRegion) {
   put_after(3, 0, 0.21, 0.02);
   const Outcome result = outcome();
   EXPECT_TRUE(result.success);
+  EXPECT_EQ(result.ending, Ending::kSucceeded);
   EXPECT_EQ(result.reason, "target in the goal region");
   EXPECT_EQ(result.actions, 3);
 }
@@ -179,6 +180,7 @@ TEST_F(MpcTest, EndsWhenTheTargetHitsTheObstacle) {
   put_after(2, 0, -0.09, 0.0);
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "target hit the obstacle");
   EXPECT_EQ(result.actions, 2);
 }
@@ -187,6 +189,7 @@ TEST_F(MpcTest, EndsWhenThePusherHitsTheObstacle) {
   robot.after_execute = [](State& state, int) { state.q[kJointX] = 0.05; };
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "pusher hit the obstacle");
   EXPECT_EQ(result.actions, 1);
 }
@@ -195,6 +198,7 @@ TEST_F(MpcTest, EndsWithTheNameOfWhatWasDropped) {
   put_after(2, 1, 0.0, 0.25, -0.5);
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "dropped other");
   EXPECT_THAT(result.dropped, testing::ElementsAre("other"));
 }
@@ -203,12 +207,14 @@ TEST_F(MpcTest, EndsWithTheNameOfWhatIsInTheGoalRegion) {
   put_after(2, 1, 0.2, 0.03);
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "other in the goal region");
 }
 
 TEST_F(MpcTest, GivesUpAfterTheLastAction) {
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "not in the goal region after 6 actions");
   EXPECT_EQ(planner.problems.size(), 6u);
 }
@@ -222,21 +228,24 @@ TEST_F(MpcTest, MovesNothingWhenOnlyAPlanIsWanted) {
   options.plan_only = true;
   Outcome result = outcome();
   EXPECT_TRUE(result.success);
+  EXPECT_EQ(result.ending, Ending::kSucceeded);
   EXPECT_EQ(result.reason, "plan reaches the goal region; not executed");
   EXPECT_EQ(result.first_plan.controls, planner.problems[0].initial);
   EXPECT_THAT(robot.executed, testing::IsEmpty());
   planner.predicts_goal = false;
   result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "plan does not reach the goal region; not executed");
 }
 
 TEST_F(MpcTest, ReportsATimeoutAsAnOutcome) {
   planner.error = Error{Code::kDeadline, "too late"};
+  EXPECT_EQ(outcome().ending, Ending::kTimedOut);
   EXPECT_THAT(outcome().reason, HasSubstr("timeout"));
   planner.error.reset();
   options.timeout = std::chrono::milliseconds(0);
-  EXPECT_THAT(outcome().reason, HasSubstr("timeout"));
+  EXPECT_EQ(outcome().ending, Ending::kTimedOut);
   EXPECT_THAT(robot.executed, testing::IsEmpty());
 }
 

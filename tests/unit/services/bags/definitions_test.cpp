@@ -99,6 +99,32 @@ TEST(DefinitionsOfIdl, SayWhatIsMalformedAndWhere) {
   EXPECT_THAT(error("module a { module msg { struct S { double x"), HasSubstr("wanted ';'"));
 }
 
+TEST(DefinitionsOfIdl, ConstantsOfAMessageStandInFrontOfItsFields) {
+  const auto result = bags::definitions_of_idl(
+      {{"a.idl",
+        "module a { module msg {\n"
+        "module S_Constants {\n const octet OK = 1;  // all is well\n const unsigned long BIG = 70000;\n};\n"
+        "// Says how.\nstruct S { octet how; };\nstruct T { double x; };\n}; };"}});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->at("a/msg/S"), "# Says how.\nuint8 OK=1  # all is well\nuint32 BIG=70000\nuint8 how\n");
+  EXPECT_EQ(result->at("a/msg/T"), "float64 x\n");
+  const auto sut = taken(Decoder::create("a/msg/S", result->at("a/msg/S")));
+  EXPECT_EQ(taken(sut.decode(Cdr().add(std::uint8_t{1}).bytes())).dump(), R"({"how":1})");
+
+  const auto error = [](std::string_view text) {
+    return bags::definitions_of_idl({{"a.idl", "module a { module msg { " + std::string(text) + " }; };"}})
+        .error()
+        .message;
+  };
+  EXPECT_THAT(error("module Values { const octet A = 1; };"), HasSubstr("got 'Values', wanted"));
+  EXPECT_THAT(error("module S_Constants { const Other A = 1; }; struct S { octet a; };"), HasSubstr("basic type"));
+  EXPECT_THAT(error("module S_Constants { const octet A = 1; }; struct T { octet a; };"), HasSubstr("wanted struct S"));
+}
+
+TEST(DefinitionOf, ResultsSaysWhatItsNumbersMean) {
+  EXPECT_THAT(definition_of("jostle_msgs/msg/GoalResult").value(), HasSubstr("uint8 TIMED_OUT=3\n"));
+}
+
 TEST(DecoderTest, DecodesEveryKindOfFieldInBothByteOrders) {
   const auto sut = taken(Decoder::create("a/msg/B",
                                          "uint8 KIND=3\nstring TEXT = \"# no comment\"\nbool flag\nint16 small\nuint64 "

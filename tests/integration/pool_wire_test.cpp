@@ -203,6 +203,25 @@ TEST_F(PoolWire, NonsenseNewsOfABatchAreIgnored) {
   expect_still_serves();
 }
 
+TEST_F(PoolWire, TasksBeyondWhatAWorkerKeepsAreCountedInItsHeartbeat) {
+  Task task = good_task();
+  task.batch().world(wire::to_wire(Hash{.high = 0xfeed, .low = 0xbeef}));  // they wait for it, 5 s
+  const auto refused = [&] {
+    const auto heartbeat = heartbeats.take(in(kPatience));
+    return heartbeat ? heartbeat->refused() : 0;
+  };
+  EXPECT_EQ(refused(), 0u);
+
+  const auto deadline = in(kPatience);
+  while (refused() == 0 && Clock::now() < deadline) {
+    for (int i = 0; i < 400; ++i) EXPECT_TRUE(tasks->write(task));
+  }
+
+  const std::uint64_t count = refused();
+  EXPECT_GT(count, 0u);
+  EXPECT_GE(refused(), count) << "it counts from the start";
+}
+
 TEST(WorkerThatCannotAnswer, SaysSoAndLivesOn) {
   const TempFolder folder;
   std::string profiles = contents(JOSTLE_PROGRAMS "/../share/jostle/profiles.xml");

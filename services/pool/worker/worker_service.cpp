@@ -73,7 +73,10 @@ WorkerService::WorkerService(const wire::Participant& participant, const WorkerO
       task_reader_(participant, wire::topics::pool_task(id_),
                    [this](const Task& task) {
                      const std::lock_guard lock(mutex_);
-                     if (arrivals_.size() == kArrivals) return;
+                     if (arrivals_.size() >= kArrivals) {
+                       ++refused_;
+                       return;
+                     }
                      arrivals_.push_back({task, std::chrono::steady_clock::now()});
                      loads_[task.client()] += static_cast<std::uint32_t>(task.samples().size());
                      kicked_ = true;
@@ -270,13 +273,20 @@ void WorkerService::say_losses() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_complaint_) return;
   std::unique_lock lock(mutex_);
-  const std::uint64_t lost_results = lost_results_;
+  const std::uint64_t lost_results = lost_results_, refused = refused_;
   lock.unlock();
-  if (lost_results == said_lost_results_) return;
-  spdlog::warn("{}: {} results were not taken by the middleware and are lost; their samples will be run again", name_,
-               lost_results - said_lost_results_);
-  said_lost_results_ = lost_results;
+  if (lost_results == said_lost_results_ && refused == said_refused_) return;
   next_complaint_ = now + kComplaints;
+  if (lost_results > said_lost_results_) {
+    spdlog::warn("{}: {} results were not taken by the middleware and are lost; their samples will be run again", name_,
+                 lost_results - said_lost_results_);
+  }
+  if (refused > said_refused_) {
+    spdlog::warn("{}: {} tasks were dropped, for {} were unread or waited for their worlds; clients send them again",
+                 name_, refused - said_refused_, kArrivals);
+  }
+  said_lost_results_ = lost_results;
+  said_refused_ = refused;
 }
 
 void WorkerService::drop_lost_clients(const std::vector<std::uint64_t>& clients) {
@@ -300,6 +310,7 @@ msg::WorkerHeartbeat WorkerService::heartbeat(const std::vector<std::uint64_t>& 
   const std::lock_guard lock(mutex_);
   message.rollouts(rollouts_);
   message.engine_steps(engine_steps_);
+  message.refused(refused_);
   for (const std::uint64_t client : clients) {
     msg::ClientLoad load;
     load.client(client);

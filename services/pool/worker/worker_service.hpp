@@ -35,7 +35,9 @@ struct WorkerOptions {
 /// Failure  a bad task is answered with an error that names the field; a task
 ///          whose world does not arrive in 5 s likewise. A client that is gone
 ///          has its samples dropped. A result that the middleware does not take is lost
-///          and counted; its client sends the sample again, or to another worker.
+///          and counted; its client sends the sample again, or to another worker. So it is
+///          with tasks beyond 1024 that were not looked at or wait for their worlds;
+///          the heartbeat says how many.
 class WorkerService {
  public:
   WorkerService(const wire::Participant& participant, const WorkerOptions& options);
@@ -99,11 +101,12 @@ class WorkerService {
   int dealt_ = 0;                                 // samples with the executor: one per busy thread
   std::uint64_t rollouts_ = 0;
   std::uint64_t engine_steps_ = 0;
+  std::uint64_t refused_ = 0;       // tasks that came when too many were unread
   std::uint64_t lost_results_ = 0;  // that the middleware did not take
   bool kicked_ = false;
 
   // Of the heart alone.
-  std::uint64_t said_lost_results_ = 0;
+  std::uint64_t said_lost_results_ = 0, said_refused_ = 0;
   TimePoint next_complaint_;
 
   wire::Writer<jostle_msgs::msg::TaskResult> result_writer_;

@@ -225,6 +225,21 @@ TEST_F(SimulatedWorldProcess, BadCommandOfAStrangerIsNotTheCommandersError) {
   EXPECT_EQ(after->error(), "");
 }
 
+TEST_F(SimulatedWorldProcess, SaysThatItsGripperIsEmpty) {
+  const auto status = statuses.take(deadline());
+  ASSERT_TRUE(status) << sim->err();
+  EXPECT_EQ(status->in_hand(), RobotStatus_Constants::EMPTY);
+}
+
+TEST_F(WorldLink, PusherSaysThatItCannotTellWhatIsInItsHand) {
+  const auto scene = folder.write("push.yaml", physics_pool::to_yaml(push_ahead()));
+  const auto sim = program("jostle_sim", {scene});
+  RobotClient robot(participant);
+  const auto reading_result = robot.read();
+  ASSERT_TRUE(reading_result) << reading_result.error().message << sim->err();
+  EXPECT_EQ(reading_result->object_in_hand, std::nullopt);
+}
+
 // jostle_coordinator and a world, asked by hand.
 class CoordinatorProcess : public WorldLink {
  protected:

@@ -3,6 +3,8 @@
 /// The robot and its objects as messages. Whatever comes from the wire is
 /// checked here before anyone calculates with it.
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +31,11 @@ Result<std::vector<perception::ObjectReading>> from_message(const jostle_msgs::m
 sensor_msgs::msg::JointState joint_state_message(const StateLayout& layout, const State& x, double time);
 geometry_msgs::msg::PoseArray pose_array_message(const jostle_msgs::msg::ObjectStates& objects);
 tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates& objects);
+
+/// `in_hand` of a status or an observation, one of RobotStatus_Constants. A number that is none of
+/// them says nothing about the hand.
+std::uint8_t in_hand_message(std::optional<bool> object_in_hand);
+std::optional<bool> in_hand_from(std::uint8_t in_hand);
 
 /// Error kInvalidArgument naming the field.
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message);

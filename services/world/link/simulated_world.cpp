@@ -144,7 +144,8 @@ void SimulatedWorld::publish() {
   status.epoch(epoch_);
   status.sequence_number(finished_);
   status.busy(busy_ || !actions_.empty());
-  status.object_in_hand(!geometry.task.is_push() && physics_pool::at_goal(geometry, truth, {}));
+  status.in_hand(in_hand_message(geometry.task.is_push() ? std::nullopt
+                                                         : std::optional(physics_pool::at_goal(geometry, truth, {}))));
   status.error(error_);
   status.q(joints.position());
   status.v(joints.velocity());

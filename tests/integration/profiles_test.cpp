@@ -111,7 +111,7 @@ TEST_F(Profiles, EveryTopicIsOfAKindThatTheFileHas) {
   const auto has = [](const Qos& qos) { return std::ranges::find(kKinds, qos.kind, &Qos::kind) != kKinds.end(); };
   EXPECT_TRUE(has(wire::topics::kTaskGoal.qos) && has(wire::topics::kTaskResult.qos) &&
               has(wire::topics::kRobotStatus.qos) && has(wire::topics::kPoolWorld.qos) &&
-              has(wire::topics::pool_task(1).qos));
+              has(wire::topics::pool_assignment(1).qos));
 }
 
 TEST_F(Profiles, BuffersAreThoseThatTheSysctlFileSets) {

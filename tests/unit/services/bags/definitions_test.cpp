@@ -81,7 +81,7 @@ TEST(DefinitionOf, IsThereForEveryMessageOfIdlAndDecodable) {
   const auto types = bags::known_types();
   ASSERT_GT(types.size(), 50u);
   for (const char* type :
-       {"jostle_msgs/msg/Plan", "jostle_msgs/msg/Task", "jostle_msgs/msg/GoalResult", "tf2_msgs/msg/TFMessage",
+       {"jostle_msgs/msg/Plan", "jostle_msgs/msg/Assignment", "jostle_msgs/msg/GoalResult", "tf2_msgs/msg/TFMessage",
         "sensor_msgs/msg/PointCloud2", "visualization_msgs/msg/MarkerArray", "nav_msgs/msg/Odometry",
         "rcl_interfaces/msg/Log", "diagnostic_msgs/msg/DiagnosticArray", "trajectory_msgs/msg/JointTrajectory"}) {
     EXPECT_THAT(types, Contains(type));
@@ -177,7 +177,7 @@ TEST(DecoderTest, RefusesOtherBytesThanTheTypeHas) {
 }
 
 TEST(DecoderTest, NeverCrashesOnChangedBytes) {
-  const auto sut = decoder("jostle_msgs/msg/Task");
+  const auto sut = decoder("jostle_msgs/msg/Assignment");
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
     Bytes bytes = noise(seed % 600 + 4, seed);
     bytes[0] = std::byte{0};

@@ -234,7 +234,7 @@ TEST_F(SimulatedWorldProcess, SaysThatItsGripperIsEmpty) {
 TEST_F(WorldLink, PusherSaysThatItCannotTellWhatIsInItsHand) {
   const auto scene = folder.write("push.yaml", physics_pool::to_yaml(push_ahead()));
   const auto sim = program("jostle_sim", {scene});
-  RobotClient robot(participant);
+  RobotClient robot(participant, {.start = kPatience});
   const auto reading_result = robot.read();
   ASSERT_TRUE(reading_result) << reading_result.error().message << sim->err();
   EXPECT_EQ(reading_result->object_in_hand, std::nullopt);

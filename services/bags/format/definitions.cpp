@@ -348,6 +348,18 @@ std::optional<std::string> definition_of(const std::string& type) {
   return found->second;
 }
 
+std::optional<std::string> earlier_definition_of(const std::string& type) {
+  static const std::map<std::string, std::string> kAppended{{"jostle_msgs/msg/GoalResult", "uint8 ending"},
+                                                            {"jostle_msgs/msg/WorkerHeartbeat", "uint64 refused"}};
+  const auto appended = kAppended.find(type);
+  std::optional<std::string> definition = definition_of(type);
+  if (appended == kAppended.end() || !definition) return {};
+  const std::size_t line = definition->find(appended->second);
+  if (line == std::string::npos) return {};
+  definition->erase(line, definition->find('\n', line) + 1 - line);
+  return definition;
+}
+
 std::vector<std::string> known_types() {
   std::vector<std::string> types;
   for (const auto& [type, text] : known()) types.push_back(type);

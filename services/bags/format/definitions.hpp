@@ -19,6 +19,10 @@ namespace jostle::bags {
 /// it keeps; nothing for other types.
 std::optional<std::string> definition_of(const std::string& type);
 
+/// The same without the field that was appended since bags were first recorded: rosbag2's files of our
+/// recorder bring no definitions. Nothing if none was.
+std::optional<std::string> earlier_definition_of(const std::string& type);
+
 /// All of those types, sorted.
 std::vector<std::string> known_types();
 

@@ -16,6 +16,7 @@ using bags::Decoder;
 using bags::definition_of;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 // CDR by hand: values aligned to their size behind the four bytes.
@@ -123,6 +124,18 @@ TEST(DefinitionsOfIdl, ConstantsOfAMessageStandInFrontOfItsFields) {
 
 TEST(DefinitionOf, ResultsSaysWhatItsNumbersMean) {
   EXPECT_THAT(definition_of("jostle_msgs/msg/GoalResult").value(), HasSubstr("uint8 TIMED_OUT=3\n"));
+}
+
+TEST(EarlierDefinitionOf, DecodesWhatWasRecordedBeforeAFieldWasAppended) {
+  const std::string type = "jostle_msgs/msg/GoalResult";
+  const auto earlier = taken(Decoder::create(type, bags::earlier_definition_of(type).value()));
+  const Bytes old = Cdr().text("goal").add(std::uint8_t{1}).text("target grasped").text("").text("{}").bytes();
+  EXPECT_FALSE(decoder(type).decode(old));
+  EXPECT_EQ(taken(earlier.decode(old)).dump(),
+            R"({"goal_id":"goal","success":true,"reason":"target grasped","error":"","report":"{}"})");
+  EXPECT_THAT(bags::earlier_definition_of("jostle_msgs/msg/WorkerHeartbeat").value(),
+              AllOf(HasSubstr("ClientLoad[] clients"), Not(HasSubstr("refused"))));
+  EXPECT_FALSE(bags::earlier_definition_of("jostle_msgs/msg/Plan"));
 }
 
 TEST(DecoderTest, DecodesEveryKindOfFieldInBothByteOrders) {

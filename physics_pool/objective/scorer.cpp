@@ -28,10 +28,20 @@ double Scorer::final(const TaskGeometry& geometry, const State& x) const {
 }
 
 bool Scorer::at_goal(const TaskGeometry& geometry, const State& x) const {
+  return stands(geometry, x) && geometry.kind->reached(geometry, x);
+}
+
+bool Scorer::stands(const TaskGeometry& geometry, const State& x) const {
   const auto target = static_cast<std::size_t>(geometry.layout.target);
   const ObjectView seen = geometry.view(x).target();
   if (seen.position()[2] < geometry.rest_heights[target] - drop_height_) return false;
-  return seen.uprightness() >= std::cos(topple_angle_) && geometry.kind->reached(geometry, x);
+  return seen.uprightness() >= std::cos(topple_angle_);
+}
+
+std::optional<bool> object_in_hand(const TaskGeometry& geometry, const State& x) {
+  if (!geometry.robot.hand) return {};
+  const Objective defaults;
+  return Scorer(defaults).stands(geometry, x) && in_pre_grasp_region(geometry, x);
 }
 
 bool at_goal(const TaskGeometry& geometry, const State& x, const Objective& objective) {

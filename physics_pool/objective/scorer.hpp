@@ -2,6 +2,7 @@
 /// \file
 /// Scorer: an objective made ready for hot loops.
 
+#include <optional>
 #include <vector>
 
 #include "physics_pool/objective/catalogue.hpp"
@@ -30,9 +31,17 @@ class Scorer {
     double weight;
     const std::vector<double>* values;
   };
+  bool stands(const TaskGeometry& geometry, const State& x) const;  // the target
+
+  friend std::optional<bool> object_in_hand(const TaskGeometry& geometry, const State& x);
+
   std::vector<Row> running_, final_;
   double drop_height_, topple_angle_;  // m, rad
 };
+
+/// What the sensor of a simulated hand tells: whether the target is in its pre-grasp region, has not dropped and does
+/// not lean; nothing where there is no hand.
+std::optional<bool> object_in_hand(const TaskGeometry& geometry, const State& x);
 
 /// Scorer::at_goal of an objective that is used once.
 bool at_goal(const TaskGeometry& geometry, const State& x, const Objective& objective);

@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "physics_pool/task/kinds.hpp"
 #include "physics_pool/task/task_geometry.hpp"
 
@@ -25,17 +22,6 @@ double cost(const TaskGeometry& geometry, const State& x, double angle_weight) {
 
 double distance(const TaskGeometry& geometry, const State& x) { return target_bearing(geometry, x).distance; }
 
-// The target's centre is in the pre-grasp region.
-bool reached(const TaskGeometry& geometry, const State& x) {
-  const Hand& hand = *geometry.robot.hand;
-  const StateView view = geometry.view(x);
-  const std::span<const double> q = view.joints();
-  const InTool p = in_tool(geometry, x, view.target().position());
-  return p.forward >= hand.near && p.forward <= hand.far &&
-         p.left <= std::min(hand.side, q[static_cast<std::size_t>(hand.left)]) &&
-         p.left >= -std::min(hand.side, q[static_cast<std::size_t>(hand.right)]);
-}
-
 std::string failure(const TaskGeometry&, const State&) { return ""; }
 
 }  // namespace
@@ -47,7 +33,7 @@ constexpr TaskKind kGrasp{.name = "grasp",
                           .misfit = misfit,
                           .cost = cost,
                           .distance = distance,
-                          .reached = reached,
+                          .reached = in_pre_grasp_region,
                           .failure = failure};
 
 }  // namespace jostle::physics_pool

@@ -79,6 +79,16 @@ TargetBearing target_bearing(const TaskGeometry& geometry, const State& x) {
   return {.distance = std::hypot(p.forward, p.left), .angle = std::abs(std::atan2(p.left, p.forward))};
 }
 
+bool in_pre_grasp_region(const TaskGeometry& geometry, const State& x) {
+  const Hand& hand = *geometry.robot.hand;
+  const StateView view = geometry.view(x);
+  const std::span<const double> q = view.joints();
+  const InTool p = in_tool(geometry, x, view.target().position());
+  return p.forward >= hand.near && p.forward <= hand.far &&
+         p.left <= std::min(hand.side, q[static_cast<std::size_t>(hand.left)]) &&
+         p.left >= -std::min(hand.side, q[static_cast<std::size_t>(hand.right)]);
+}
+
 int count_obstructions(const TaskGeometry& geometry, const State& x) {
   if (!geometry.robot.hand) return 0;
   const Hand& hand = *geometry.robot.hand;

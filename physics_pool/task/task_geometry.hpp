@@ -47,6 +47,9 @@ struct TargetBearing {
 };
 TargetBearing target_bearing(const TaskGeometry& geometry, const State& x);
 
+/// Whether the target's centre is in the pre-grasp region of the hand, which there must be.
+bool in_pre_grasp_region(const TaskGeometry& geometry, const State& x);
+
 /// Other objects whose centre lies between the fingers, palm to fingertips; 0 without a hand.
 int count_obstructions(const TaskGeometry& geometry, const State& x);
 

@@ -154,14 +154,13 @@ class Run {
   Result<void> conclude() {
     Outcome& outcome = execution_.outcome();
     if (!dropped().empty()) {
-      outcome.reason = fmt::format("dropped {}", fmt::join(dropped(), ", "));
+      outcome.conclude(Ending::kFailed, fmt::format("dropped {}", fmt::join(dropped(), ", ")));
     } else if (in_hand_) {
-      outcome.success = true;
-      outcome.reason = "target grasped";
+      outcome.conclude(Ending::kSucceeded, "target grasped");
+    } else if (execution_.plan().at_goal) {
+      outcome.conclude(Ending::kSucceeded, "plan reaches the target; not executed");
     } else {
-      outcome.success = execution_.plan().at_goal;
-      outcome.reason =
-          outcome.success ? "plan reaches the target; not executed" : "plan does not reach the target; not executed";
+      outcome.conclude(Ending::kFailed, "plan does not reach the target; not executed");
     }
     return {};
   }

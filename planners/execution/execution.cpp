@@ -6,6 +6,32 @@
 
 namespace jostle::planners {
 
+const char* to_string(Ending ending) {
+  switch (ending) {
+    case Ending::kUnknown:
+      return "unknown";
+    case Ending::kSucceeded:
+      return "succeeded";
+    case Ending::kFailed:
+      return "failed";
+    case Ending::kTimedOut:
+      return "timed out";
+    case Ending::kCancelled:
+      return "cancelled";
+    case Ending::kBroken:
+      return "broken";
+    case Ending::kRefused:
+      return "refused";
+  }
+  return "unknown";
+}
+
+void Outcome::conclude(Ending how, std::string why) {
+  ending = how;
+  success = how == Ending::kSucceeded;
+  reason = std::move(why);
+}
+
 Execution::Execution(const ControlSetup& setup, double step_duration, std::chrono::milliseconds timeout,
                      const OnEvent& on_event, std::stop_token stop)
     : setup_(setup),
@@ -82,7 +108,7 @@ Result<Outcome> Execution::end(const Result<void>& ended) {
   outcome_.total_time = Clock::now() - start_;
   if (!ended) {
     if (ended.error().code != Code::kDeadline) return ended.error();
-    outcome_.reason = fmt::format("timeout after {:.0f} s", outcome_.total_time.count());
+    outcome_.conclude(Ending::kTimedOut, fmt::format("timeout after {:.0f} s", outcome_.total_time.count()));
   }
   notify(Phase::kDone);
   return std::move(outcome_);

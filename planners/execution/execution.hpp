@@ -3,6 +3,7 @@
 /// What every controller does alike: observe, plan, act, tell, keep count.
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <stop_token>
@@ -44,9 +45,25 @@ struct ControlEvent {
 };
 using OnEvent = std::function<void(const ControlEvent&)>;
 
+/// How a run ended; the numbers are those of jostle_msgs/msg/GoalResult. A controller says the first
+/// four, whoever started it the others.
+enum class Ending : std::uint8_t {
+  kUnknown = 0,  ///< not over yet, or nobody has said
+  kSucceeded = 1,
+  kFailed = 2,  ///< it came to an end, and not to the wanted one
+  kTimedOut = 3,
+  kCancelled = 4,
+  kBroken = 5,  ///< parts of the system failed
+  kRefused = 6  ///< never begun
+};
+
+/// "succeeded", "timed out".
+const char* to_string(Ending ending);
+
 struct Outcome {
-  bool success = false;
-  std::string reason;  ///< one sentence
+  Ending ending = Ending::kUnknown;
+  bool success = false;  ///< whether `ending` is kSucceeded
+  std::string reason;    ///< one sentence
   Plan first_plan;
   int replans = 0;
   int actions = 0;
@@ -57,6 +74,10 @@ struct Outcome {
   std::chrono::duration<double> total_time{};
   Trajectory observed;  ///< before the first action and after each
   std::vector<std::string> dropped;
+
+  /// Says how it ended, and why for people.
+  void conclude(Ending how, std::string why);
+  bool is_over() const { return ending != Ending::kUnknown; }
 };
 
 /// One run of a controller under way: the newest state, the present plan, and what

@@ -77,23 +77,23 @@ class Run {
     Outcome& outcome = execution_.outcome();
     const physics_pool::TaskGeometry& geometry = setup_.geometry;
     if (!outcome.dropped.empty()) {
-      outcome.reason = fmt::format("dropped {}", fmt::join(outcome.dropped, ", "));
+      outcome.conclude(Ending::kFailed, fmt::format("dropped {}", fmt::join(outcome.dropped, ", ")));
     } else if (const std::string failure = geometry.kind->failure(geometry, x()); !failure.empty()) {
-      outcome.reason = failure;
+      outcome.conclude(Ending::kFailed, failure);
     } else if (physics_pool::at_goal(geometry, x(), setup_.objective)) {
-      outcome.success = true;
-      outcome.reason = geometry.kind->achieved;
+      outcome.conclude(Ending::kSucceeded, geometry.kind->achieved);
     } else if (outcome.actions >= options_.max_actions) {
-      outcome.reason = fmt::format("not in the goal region after {} actions", outcome.actions);
+      outcome.conclude(Ending::kFailed, fmt::format("not in the goal region after {} actions", outcome.actions));
     }
-    return !outcome.reason.empty();
+    return outcome.is_over();
   }
 
   Result<void> conclude_plan() {
-    Outcome& outcome = execution_.outcome();
-    outcome.success = execution_.plan().at_goal;
-    outcome.reason = outcome.success ? "plan reaches the goal region; not executed"
-                                     : "plan does not reach the goal region; not executed";
+    if (execution_.plan().at_goal) {
+      execution_.outcome().conclude(Ending::kSucceeded, "plan reaches the goal region; not executed");
+    } else {
+      execution_.outcome().conclude(Ending::kFailed, "plan does not reach the goal region; not executed");
+    }
     return {};
   }
 

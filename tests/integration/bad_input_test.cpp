@@ -66,6 +66,26 @@ TEST_F(BadInput, SceneThatCannotBeIsRefusedWithFileFieldGotAndWanted) {
   expect_refused({scene_file([](Scene& s) { s.objects[2].name = "can"; })}, {spoilt, "objects[2]", "'can'"});
 }
 
+TEST_F(BadInput, SceneToolEndsWithTwoOnABadFileAndWithOneWhenItCannotWrite) {
+  const std::string broken = folder.write("broken.yaml", "jostle_scene: [1, 2\n");
+  for (const std::string file : {broken, (folder.path() / "missing.yaml").string()}) {
+    for (const char* command : {"check", "show", "perturb"}) {
+      const auto tool = program("jostle_scene", {command, file});
+      EXPECT_EQ(tool->wait(kPatience), 2) << command;
+      EXPECT_THAT(tool->err(), HasSubstr(file));
+      EXPECT_EQ(tool->out(), "");
+    }
+  }
+  const auto crowd = program("jostle_scene", {"generate", "--objects", "4000"});
+  EXPECT_EQ(crowd->wait(kPatience), 2);
+  const auto unwritable = program("jostle_scene", {"generate", "-o", broken + "/scene.yaml"});
+  EXPECT_EQ(unwritable->wait(kPatience), 1);
+  EXPECT_THAT(unwritable->err(), HasSubstr("cannot be written"));
+  const auto good = program("jostle_scene", {"show", easy});
+  EXPECT_EQ(good->wait(kPatience), 0);
+  EXPECT_THAT(good->out(), HasSubstr("name             shape"));
+}
+
 // As happens beyond domain 100, where Linux gives the ports to any program that wants some port.
 TEST_F(BadInput, DomainWhosePortOfDiscoveryIsTakenIsRefusedWithPortAndRemedy) {
   const int port = 7400 + 250 * domain;

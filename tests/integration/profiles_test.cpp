@@ -11,6 +11,7 @@
 #include "services/wire/dds/reader.hpp"
 #include "services/wire/dds/topics.hpp"
 #include "services/wire/dds/writer.hpp"
+#include "tests/support/cramped_writer.hpp"
 #include "tests/support/program_process.hpp"
 #include "tests/support/worker_process.hpp"
 
@@ -110,7 +111,7 @@ TEST_F(Profiles, EveryTopicIsOfAKindThatTheFileHas) {
   const auto has = [](const Qos& qos) { return std::ranges::find(kKinds, qos.kind, &Qos::kind) != kKinds.end(); };
   EXPECT_TRUE(has(wire::topics::kTaskGoal.qos) && has(wire::topics::kTaskResult.qos) &&
               has(wire::topics::kRobotStatus.qos) && has(wire::topics::kPoolWorld.qos) &&
-              has(wire::topics::pool_task(1).qos));
+              has(wire::topics::pool_assignment(1).qos));
 }
 
 TEST_F(Profiles, BuffersAreThoseThatTheSysctlFileSets) {
@@ -127,7 +128,7 @@ std::vector<std::string> kept_of_five(const wire::Participant& participant) {
   for (int i = 0; i < 5; ++i) {
     jostle_msgs::msg::GoalResult result;
     result.goal_id(std::to_string(i));
-    writer.write(result);
+    EXPECT_TRUE(writer.write(result));
   }
   wire::Inbox<jostle_msgs::msg::GoalResult> late(participant, wire::topics::kTaskResult, 100);
   std::vector<std::string> ids;
@@ -195,10 +196,19 @@ TEST_F(Profiles, SharedMemoryCarriesLargeSamples) {
   jostle_msgs::msg::Goal goal;
   goal.execution_scene(std::string(1 << 20, 'x'));
   ASSERT_TRUE(writer.wait_for_readers(in(10s)));
-  writer.write(goal);
+  EXPECT_TRUE(writer.write(goal));
   const auto got = goals.take(in(10s));
   ASSERT_TRUE(got);
   EXPECT_EQ(got->execution_scene(), goal.execution_scene());
+}
+
+TEST_F(Profiles, MessageThatDoesNotFitIsSaidToBeLost) {
+  load(edit("</profiles>", cramped_writer(wire::topics::kTaskGoal.name) + "</profiles>").text);
+  wire::Writer<jostle_msgs::msg::Goal> writer(participant, wire::topics::kTaskGoal);
+  jostle_msgs::msg::Goal goal;
+  EXPECT_TRUE(writer.write(goal));
+  goal.execution_scene(std::string(1 << 20, 'x'));
+  EXPECT_FALSE(writer.write(goal));
 }
 
 TEST_F(Profiles, TransportThatNobodyDefinesIsRefused) {

@@ -35,12 +35,13 @@ TEST_F(Run, GraspsTheTargetOfAnEasySceneAndTellsAll) {
   ASSERT_EQ(finish({easy, "--workers", "2", "--seed", "7", "--json", result_file()}), 0) << run->err();
 
   const json report = result();
-  for (const char* key :
-       {"success", "reason", "scene_hash", "seed", "controller", "uncertainty", "pool", "workers", "plan_hash", "cost",
-        "iterations", "replans", "actions", "plan_seconds", "total_seconds", "rollouts", "dropped_objects"}) {
+  for (const char* key : {"success", "ending", "reason", "scene_hash", "seed", "controller", "uncertainty", "pool",
+                          "workers", "plan_hash", "cost", "iterations", "replans", "actions", "plan_seconds",
+                          "total_seconds", "rollouts", "dropped_objects"}) {
     EXPECT_TRUE(report.contains(key)) << key;
   }
   EXPECT_EQ(report["success"], true);
+  EXPECT_EQ(report["ending"], "succeeded");
   EXPECT_EQ(report["seed"], 7);
   EXPECT_EQ(report["controller"], "or");
   EXPECT_EQ(report["uncertainty"], "none");

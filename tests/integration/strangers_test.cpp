@@ -26,7 +26,7 @@ const std::string kCommand = "rt/robot/command";
 const std::string kElsewhere = "rt/x/robot/command";
 const std::string kResult = "rt/pool/result";
 const std::string kHeartbeat = "rt/pool/worker";
-const std::string kTask = "rt/pool/task/w0123456789abcdef";
+const std::string kAssignment = "rt/pool/assignment/w0123456789abcdef";
 // Two seconds of samples: authentication takes 0.1 s, announcements come twice a second.
 constexpr int kMany = 100;
 
@@ -253,15 +253,17 @@ TEST_F(Roles, RobotsHearEachOtherInSmallAndLargeSamples) {
 
 TEST_F(Roles, WorkerDoesItsPoolTopicsAndNoOthers) {
   const fs::path helper = lab.issue("helper", Role::kWorker);
-  Peer robot(folder, "robot", secure(arm), {kTask, kCommand, kElsewhere}, {kResult, kHeartbeat, kCommand, kElsewhere});
+  Peer robot(folder, "robot", secure(arm), {kAssignment, kCommand, kElsewhere},
+             {kResult, kHeartbeat, kCommand, kElsewhere});
   Peer other(folder, "other", secure(other_arm), {kCommand, kElsewhere}, {});
-  Peer worker(folder, "worker", secure(helper), {kResult, kHeartbeat, kCommand, kElsewhere, kTask},
-              {kTask, kCommand, kElsewhere});
+  Peer worker(folder, "worker", secure(helper), {kResult, kHeartbeat, kCommand, kElsewhere, kAssignment},
+              {kAssignment, kCommand, kElsewhere});
   ASSERT_TRUE(worker.is_ready()) << worker.out() << worker.err();
 
-  for (const std::string& topic : {kCommand, kElsewhere, kTask}) EXPECT_TRUE(worker.holds("refused writer " + topic));
+  for (const std::string& topic : {kCommand, kElsewhere, kAssignment})
+    EXPECT_TRUE(worker.holds("refused writer " + topic));
   for (const std::string& topic : {kCommand, kElsewhere}) EXPECT_TRUE(worker.holds("refused reader " + topic));
-  EXPECT_TRUE(worker.gets(robot, kTask)) << worker.out() << worker.err();
+  EXPECT_TRUE(worker.gets(robot, kAssignment)) << worker.out() << worker.err();
   for (const std::string& topic : {kResult, kHeartbeat}) EXPECT_TRUE(robot.gets(worker, topic, 10)) << topic;
   for (const std::string& topic : {kCommand, kElsewhere}) {
     EXPECT_TRUE(robot.gets(other, topic, 10)) << topic;
@@ -291,38 +293,39 @@ TEST_F(Roles, WorkerThatDisarmsItsOwnSideIsStillRefusedByRobots) {
   governance.insert(begin, open);
   overwrite(helper / "governance.p7s", wire::sign_text(*rogue.certificate, *rogue.key, governance));
 
-  Peer robot(folder, "robot", secure(arm), {kTask, kCommand}, {kResult, kCommand});
+  Peer robot(folder, "robot", secure(arm), {kAssignment, kCommand}, {kResult, kCommand});
   Peer other(folder, "other", secure(other_arm), {kCommand}, {});
   Peer worker(folder, "worker", {"--raw", helper.string(), "--permissions-ca", both}, {kResult, kCommand},
-              {kTask, kCommand});
+              {kAssignment, kCommand});
   ASSERT_TRUE(worker.is_ready()) << worker.out() << worker.err();
   EXPECT_THAT(worker.out(), Not(HasSubstr("refused")));
 
   EXPECT_TRUE(robot.gets(worker, kResult)) << robot.out() << robot.err();
-  EXPECT_TRUE(worker.gets(robot, kTask, 10));
+  EXPECT_TRUE(worker.gets(robot, kAssignment, 10));
   EXPECT_TRUE(robot.gets(other, kCommand, 10));
   EXPECT_EQ(robot.count("worker", kCommand), 0);
   EXPECT_EQ(worker.count("robot", kCommand) + worker.count("other", kCommand), 0);
 }
 
 TEST_F(Roles, ObserverHearsEverythingAndSaysNothing) {
-  Peer robot(folder, "robot", secure(arm), {kCommand, kTask, kElsewhere}, {kCommand});
+  Peer robot(folder, "robot", secure(arm), {kCommand, kAssignment, kElsewhere}, {kCommand});
   Peer observer(folder, "observer", secure(lab.issue("recorder", Role::kObserver)), {kCommand, kResult},
-                {kCommand, kTask, kElsewhere});
+                {kCommand, kAssignment, kElsewhere});
   ASSERT_TRUE(observer.is_ready()) << observer.out() << observer.err();
 
   for (const std::string& topic : {kCommand, kResult}) EXPECT_TRUE(observer.holds("refused writer " + topic));
-  for (const std::string& topic : {kCommand, kTask, kElsewhere}) EXPECT_TRUE(observer.gets(robot, topic, 10)) << topic;
+  for (const std::string& topic : {kCommand, kAssignment, kElsewhere})
+    EXPECT_TRUE(observer.gets(robot, topic, 10)) << topic;
 }
 
 TEST_F(Roles, ServerJoinsAndSaysAndHearsNothing) {
   Peer server(folder, "server", secure(lab.issue("meeting-point", Role::kServer)), {kCommand, kResult},
-              {kCommand, kTask});
+              {kCommand, kAssignment});
 
   ASSERT_TRUE(server.is_ready()) << server.out() << server.err();
 
   for (const std::string& topic : {kCommand, kResult}) EXPECT_TRUE(server.holds("refused writer " + topic));
-  for (const std::string& topic : {kCommand, kTask}) EXPECT_TRUE(server.holds("refused reader " + topic));
+  for (const std::string& topic : {kCommand, kAssignment}) EXPECT_TRUE(server.holds("refused reader " + topic));
 }
 
 }  // namespace

@@ -227,13 +227,13 @@ TEST_F(SimulatedWorldProcess, RefusesBadCommandsByFieldAndTakesTheNextGoodOne) {
       {"duration: got -1", [](auto& c) { c.duration(-1.0); }},
       {"duration: got 1e+18", [](auto& c) { c.duration(1e18); }}};
   std::uint64_t number = 0;
-  commands.write(command(5, ++number));
+  EXPECT_TRUE(commands.write(command(5, ++number)));
   auto before = finished(5, number);
   ASSERT_TRUE(before);
   for (const auto& [problem, spoil] : cases) {
     VelocityCommand bad = command(5, ++number);
     spoil(bad);
-    commands.write(bad);
+    EXPECT_TRUE(commands.write(bad));
 
     const auto refusal = status_that([](const RobotStatus& status) { return !status.error().empty(); });
 
@@ -241,14 +241,14 @@ TEST_F(SimulatedWorldProcess, RefusesBadCommandsByFieldAndTakesTheNextGoodOne) {
     EXPECT_THAT(refusal->error(), HasSubstr(fmt::format("command {}: {}", number, problem)));
     EXPECT_EQ(refusal->q(), before->q());
     EXPECT_EQ(refusal->sequence_number(), number);  // nobody waits for it any longer
-    commands.write(command(5, ++number));
+    EXPECT_TRUE(commands.write(command(5, ++number)));
     const auto after = finished(5, number);
     ASSERT_TRUE(after) << sim->err();
     EXPECT_EQ(after->error(), "");
     // Moves back, so that all cases start from the same place.
     VelocityCommand back = command(5, ++number);
     back.velocities({-0.05, 0.0, 0.0, 0.0});
-    commands.write(back);
+    EXPECT_TRUE(commands.write(back));
     const auto home = finished(5, number);
     ASSERT_TRUE(home);
     EXPECT_NEAR(home->q()[0], before->q()[0], 5e-3);
@@ -257,36 +257,51 @@ TEST_F(SimulatedWorldProcess, RefusesBadCommandsByFieldAndTakesTheNextGoodOne) {
 }
 
 TEST_F(SimulatedWorldProcess, DropsCommandsOfAnOlderEpochAndOnesAlreadyDone) {
-  commands.write(command(5, 1));
+  EXPECT_TRUE(commands.write(command(5, 1)));
   const auto first = finished(5, 1);
   ASSERT_TRUE(first) << sim->err();
   EXPECT_GT(first->q()[0], -0.33 + 5e-3);
 
-  commands.write(command(5, 1));
-  commands.write(command(4, 2));
+  EXPECT_TRUE(commands.write(command(5, 1)));
+  EXPECT_TRUE(commands.write(command(4, 2)));
   ASSERT_TRUE(sim->says("command 4/2 is stale (2 so far), dropped", kPatience)) << sim->err();
   const auto after = status_that([](const RobotStatus& status) { return !status.busy(); });
   ASSERT_TRUE(after);
   EXPECT_EQ(after->epoch(), 5u);
   EXPECT_EQ(after->q(), first->q());
 
-  commands.write(command(6, 1));  // a new commander starts counting anew
+  EXPECT_TRUE(commands.write(command(6, 1)));  // a new commander starts counting anew
   EXPECT_TRUE(finished(6, 1)) << sim->err();
 }
 
 TEST_F(SimulatedWorldProcess, BadCommandOfAStrangerIsNotTheCommandersError) {
-  commands.write(command(5, 1));
+  EXPECT_TRUE(commands.write(command(5, 1)));
   ASSERT_TRUE(finished(5, 1)) << sim->err();
   VelocityCommand bad = command(9, 1);
   bad.duration(kNaN);
 
-  commands.write(bad);
+  EXPECT_TRUE(commands.write(bad));
 
   ASSERT_TRUE(sim->says("duration: got nan", kPatience)) << sim->err();
-  commands.write(command(5, 2));
+  EXPECT_TRUE(commands.write(command(5, 2)));
   const auto after = finished(5, 2);
   ASSERT_TRUE(after) << sim->err();
   EXPECT_EQ(after->error(), "");
+}
+
+TEST_F(SimulatedWorldProcess, SaysThatItsGripperIsEmpty) {
+  const auto status = statuses.take(deadline());
+  ASSERT_TRUE(status) << sim->err();
+  EXPECT_EQ(status->in_hand(), RobotStatus_Constants::EMPTY);
+}
+
+TEST_F(WorldLink, PusherSaysThatItCannotTellWhatIsInItsHand) {
+  const auto scene = folder.write("push.yaml", physics_pool::to_yaml(push_ahead()));
+  const auto sim = program("jostle_sim", {scene});
+  RobotClient robot(participant, {.start = kPatience});
+  const auto reading_result = robot.read();
+  ASSERT_TRUE(reading_result) << reading_result.error().message << sim->err();
+  EXPECT_EQ(reading_result->object_in_hand, std::nullopt);
 }
 
 // jostle_coordinator and a world, asked by hand.
@@ -338,18 +353,20 @@ TEST_F(CoordinatorProcess, AnswersBadGoalsWithTheFieldAndGoesOnServing) {
   for (const auto& [field, spoil] : cases) {
     Goal bad = goal(fmt::format("bad-{}", ++count));
     spoil(bad);
-    goals.write(bad);
+    EXPECT_TRUE(goals.write(bad));
 
     const GoalResult result = result_of(bad.goal_id());
 
     EXPECT_FALSE(result.success());
+    EXPECT_EQ(result.ending(), GoalResult_Constants::BROKEN);
     EXPECT_THAT(result.error(), HasSubstr(field));
     EXPECT_EQ(result.report(), "");
   }
-  goals.write(goal("good"));
+  EXPECT_TRUE(goals.write(goal("good")));
   const GoalResult result = result_of("good");
   EXPECT_EQ(result.error(), "");
   EXPECT_TRUE(result.success()) << result.reason();
+  EXPECT_EQ(result.ending(), GoalResult_Constants::SUCCEEDED);
 }
 
 TEST_F(CoordinatorProcess, BelievedWorldOfOtherObjectsIsAnErrorThatNamesThem) {
@@ -358,7 +375,7 @@ TEST_F(CoordinatorProcess, BelievedWorldOfOtherObjectsIsAnErrorThatNamesThem) {
   scene.objects[1].name = "teapot";
   other.planning_scene(physics_pool::to_yaml(scene));
 
-  goals.write(other);
+  EXPECT_TRUE(goals.write(other));
 
   EXPECT_THAT(result_of("other").error(), HasSubstr("teapot"));
 }
@@ -366,22 +383,23 @@ TEST_F(CoordinatorProcess, BelievedWorldOfOtherObjectsIsAnErrorThatNamesThem) {
 TEST_F(CoordinatorProcess, RefusesASecondGoalWhileBusyAndObeysCancel) {
   Goal endless_goal = goal("first");
   endless_goal.parameters(contents(endless));
-  goals.write(endless_goal);
-  goals.write(goal("second"));
+  EXPECT_TRUE(goals.write(endless_goal));
+  EXPECT_TRUE(goals.write(goal("second")));
 
   const GoalResult refusal = result_of("second");
 
   EXPECT_FALSE(refusal.success());
+  EXPECT_EQ(refusal.ending(), GoalResult_Constants::REFUSED);
   EXPECT_THAT(refusal.error(), HasSubstr("busy with goal first"));
 
   Cancel cancel;
   cancel.goal_id("somebody else's");
-  cancels.write(cancel);
+  EXPECT_TRUE(cancels.write(cancel));
   cancel.goal_id("first");
-  cancels.write(cancel);
-  EXPECT_EQ(result_of("first").reason(), "cancelled");
+  EXPECT_TRUE(cancels.write(cancel));
+  EXPECT_EQ(result_of("first").ending(), GoalResult_Constants::CANCELLED);
 
-  goals.write(goal("third"));
+  EXPECT_TRUE(goals.write(goal("third")));
   EXPECT_TRUE(result_of("third").success());
 }
 

@@ -29,7 +29,8 @@ inline State moved(State x, std::span<const double> u, double duration) {
 
 class KinematicRobot final : public robot_bridge::Robot {
  public:
-  explicit KinematicRobot(State& x, int joints = 5) : x_(x), joints_(joints) {}
+  explicit KinematicRobot(State& x, int joints = 5, int axes = kGripperControls)
+      : x_(x), joints_(joints), limits_(static_cast<std::size_t>(axes), 2.0) {}
 
   Result<robot_bridge::RobotReading> read() override {
     if (read_error) return *read_error;
@@ -40,8 +41,7 @@ class KinematicRobot final : public robot_bridge::Robot {
 
   Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override {
     if (execute_error) return *execute_error;
-    const int axes = joints_ == kPusherJoints ? kPusherAxes : kGripperAxes;
-    if (auto ok = robot_bridge::check_command(u, axes, duration); !ok) return ok;
+    if (auto ok = robot_bridge::check_command(u, limits_, duration); !ok) return ok;
     if (stop.stop_requested()) return Error{Code::kCancelled, "robot: cancelled"};
     executed.emplace_back(u.begin(), u.end());
     durations.push_back(duration);
@@ -59,6 +59,7 @@ class KinematicRobot final : public robot_bridge::Robot {
  private:
   State& x_;
   int joints_;
+  std::vector<double> limits_;  // per axis
 };
 
 class KinematicObjects final : public perception::ObjectSource {

@@ -130,7 +130,7 @@ class RecordedRig : public WorldRig {
 
   /// `rate`: of RecordedWorld.
   explicit RecordedRig(const physics_pool::Scene& its_scene, double rate = 0.0)
-      : WorldRig(its_scene), run_(record()), world_(run_, rate) {}
+      : WorldRig(its_scene), run_(record()), world_(run_, physics_pool::axis_limits(scene.robot.model), rate) {}
 
   robot_bridge::Robot& robot() override { return robot_; }
   perception::ObjectSource& objects() override { return objects_; }
@@ -192,7 +192,7 @@ class KinematicRig final : public WorldRig {
 
  private:
   State x_ = physics_pool::initial_state(scene);
-  KinematicRobot robot_{x_, layout.robot_joints()};
+  KinematicRobot robot_{x_, layout.robot_joints(), layout.nu};
   KinematicObjects objects_{layout, x_};
 };
 

@@ -33,8 +33,14 @@ struct Field {
 
 struct Struct {
   std::vector<std::string> comments;
+  std::vector<std::string> constants;  // lines, "uint8 OK=1  # comment"
   std::vector<Field> fields;
 };
+
+std::string line_of(const Field& field) {
+  return fmt::format("{}{} {}{}{}\n", field.type, field.array, field.name, field.comment.empty() ? "" : "  # ",
+                     field.comment);
+}
 
 using Structs = std::map<std::string, Struct>;  // by "pkg/Name"
 
@@ -161,17 +167,49 @@ class IdlParser {
     expect("module");
     if (const Token token = take(); token.text != "msg") fail(token, "module msg");
     expect("{");
-    while (!error_ && !take_if("}")) parse_struct();
+    while (!error_ && !take_if("}")) {
+      if (peek().text == "module") {
+        parse_constants();
+      } else {
+        parse_struct();
+      }
+    }
     expect(";");
     expect("}");
     expect(";");
   }
 
+  // Of the struct that follows, in a module of their own: IDL has no constants in a struct.
+  void parse_constants() {
+    expect("module");
+    const Token name = take();
+    constexpr std::string_view kSuffix = "_Constants";
+    if (!name.text.ends_with(kSuffix)) fail(name, "a struct, or a module of its constants, NAME_Constants");
+    constants_of_ = name.text.substr(0, name.text.size() - std::min(kSuffix.size(), name.text.size()));
+    expect("{");
+    while (!error_ && !take_if("}")) {
+      expect("const");
+      Field constant;
+      parse_type(constant);
+      if (constant.is_ours) fail(peek(), "a constant of a basic type");
+      constant.name = take_name();
+      expect("=");
+      constant.name += "=" + take().text;
+      constant.comment = end_of_field();
+      constants_.push_back(line_of(constant));
+    }
+    expect(";");
+    pending_.clear();
+  }
+
   void parse_struct() {
-    const int line = peek().line;
-    Struct message{.comments = comments_before(line)};
+    const Token first = peek();
+    Struct message{.comments = comments_before(first.line)};
     expect("struct");
     const std::string name = take_name();
+    if (!constants_.empty() && name != constants_of_)
+      fail(first, "struct " + constants_of_ + ", whose constants these are");
+    message.constants = std::exchange(constants_, {});
     expect("{");
     while (!error_ && !take_if("}")) message.fields.push_back(parse_field());
     expect(";");
@@ -199,10 +237,16 @@ class IdlParser {
       field.array = "[" + take().text + "]";
       expect("]");
     }
+    field.comment = end_of_field();
+    return field;
+  }
+
+  // Its semicolon, and the comment on its line.
+  std::string end_of_field() {
     const int last_line = tokens_[at_].line;
     expect(";");
-    if (!error_ && tokens_[at_].is_comment && tokens_[at_].line == last_line) field.comment = tokens_[at_++].comment;
-    return field;
+    if (error_ || !tokens_[at_].is_comment || tokens_[at_].line != last_line) return "";
+    return tokens_[at_++].comment;
   }
 
   void parse_type(Field& field) {
@@ -236,7 +280,9 @@ class IdlParser {
   std::size_t at_ = 0;
   Structs& structs_;
   std::string package_;
-  std::vector<std::string> pending_;  // comments on lines of their own
+  std::string constants_of_;            // a struct that must follow
+  std::vector<std::string> constants_;  // its lines
+  std::vector<std::string> pending_;    // comments on lines of their own
   int pending_line_ = 0;
   std::optional<Error> error_;
 };
@@ -244,10 +290,10 @@ class IdlParser {
 std::string text_of(const Struct& message) {
   std::string text;
   for (const std::string& comment : message.comments) text += "# " + comment + "\n";
+  for (const std::string& constant : message.constants) text += constant;
   for (const Field& field : message.fields) {
     for (const std::string& comment : field.comments_before) text += "# " + comment + "\n";
-    text += fmt::format("{}{} {}{}{}\n", field.type, field.array, field.name, field.comment.empty() ? "" : "  # ",
-                        field.comment);
+    text += line_of(field);
   }
   return text;
 }
@@ -300,6 +346,19 @@ std::optional<std::string> definition_of(const std::string& type) {
   const auto found = known().find(type);
   if (found == known().end()) return {};
   return found->second;
+}
+
+std::optional<std::string> earlier_definition_of(const std::string& type) {
+  static const std::map<std::string, std::string> kAppended{{"jostle_msgs/msg/GoalResult", "uint8 ending"},
+                                                            {"jostle_msgs/msg/RobotStatus", "float64[] limits"},
+                                                            {"jostle_msgs/msg/WorkerHeartbeat", "uint64 refused"}};
+  const auto appended = kAppended.find(type);
+  std::optional<std::string> definition = definition_of(type);
+  if (appended == kAppended.end() || !definition) return {};
+  const std::size_t line = definition->find(appended->second);
+  if (line == std::string::npos) return {};
+  definition->erase(line, definition->find('\n', line) + 1 - line);
+  return definition;
 }
 
 std::vector<std::string> known_types() {

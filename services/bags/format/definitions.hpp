@@ -19,10 +19,16 @@ namespace jostle::bags {
 /// it keeps; nothing for other types.
 std::optional<std::string> definition_of(const std::string& type);
 
+/// The same without the field that was appended since bags were first recorded: rosbag2's files of our
+/// recorder bring no definitions. Nothing if none was.
+std::optional<std::string> earlier_definition_of(const std::string& type);
+
 /// All of those types, sorted.
 std::vector<std::string> known_types();
 
-/// The same from IDL: modules of modules of structs, as idl/msg has them; by type.
+/// The same from IDL: modules of modules of structs, as idl/msg has them; by type. A module
+/// `Name_Constants` of `const TYPE NAME = VALUE;` holds the constants of the struct `Name`, as ROS 2
+/// writes them.
 /// Error kInvalidArgument with file name and line.
 Result<std::map<std::string, std::string>> definitions_of_idl(
     const std::vector<std::pair<std::string_view, std::string_view>>& files);

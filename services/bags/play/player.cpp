@@ -168,7 +168,7 @@ struct Player::Impl {
     status.bag_time(playback->time(now));
     status.passes(static_cast<std::uint32_t>(playback->passes()));
     status.messages(publisher->sent());
-    statuses->write(status);
+    (void)statuses->write(status);  // told again with the next change, and whoever controls us asks again
   }
 
   void publish_clock(TimePoint now) {
@@ -176,7 +176,7 @@ struct Player::Impl {
     rosgraph_msgs::msg::Clock message;
     message.clock().sec(static_cast<std::int32_t>(time / 1'000'000'000));
     message.clock().nanosec(static_cast<std::uint32_t>(time % 1'000'000'000));
-    clock->write(wire::to_cdr(message));
+    (void)clock->write(wire::to_cdr(message));  // the next one is due in a moment
   }
 
   void draw(const char* state, TimePoint now) {

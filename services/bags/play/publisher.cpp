@@ -58,7 +58,7 @@ void Publisher::tell_newcomers() {
   for (Output& to : outputs_) {
     if (to.newest.empty()) continue;
     const int readers = to.writer.matched();
-    if (readers > to.readers) to.writer.write(to.newest);
+    if (readers > to.readers && !to.writer.write(to.newest)) ++refused_;
     to.readers = readers;
   }
 }

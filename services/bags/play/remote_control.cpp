@@ -54,7 +54,7 @@ Result<PlayStatus> control_remotely(const std::vector<Control>& controls, const 
     do {
       if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
       if (std::chrono::steady_clock::now() >= deadline) return no_playback(options, domain);
-      writer.write(control);
+      (void)writer.write(control);  // repeated until a status answers it
       const auto again = std::min(deadline, std::chrono::steady_clock::now() + kRepeat);
       do status = statuses.take(again, stop);
       while (status && !is_done(*status, control));

@@ -63,10 +63,12 @@ class Collector {
       return with<Plan>(message,
                         [&](Plan plan) { parts_[plan.goal_id()].plans.try_emplace(plan.number(), std::move(plan)); });
     }
-    return with<GoalResult>(message, [&](GoalResult result) {
-      parts_[result.goal_id()].end = message.log_time;
-      parts_[result.goal_id()].result = std::move(result);
-    });
+    auto result = result_from_cdr(message.data);
+    if (!result) return result.error();
+    Parts& parts = parts_[result->goal_id()];
+    parts.end = message.log_time;
+    parts.result = std::move(result).value();
+    return {};
   }
 
   Result<std::vector<RecordedRun>> runs(const BagInfo& info) const {
@@ -124,9 +126,31 @@ class Collector {
 
 }  // namespace
 
+Result<GoalResult> result_from_cdr(std::span<const std::byte> data) {
+  auto result = wire::from_cdr<GoalResult>(data);
+  if (result) return result;
+  // The octet needs no alignment: with a zero behind it, the old layout is the new one.
+  std::vector<std::byte> longer(data.begin(), data.end());
+  longer.push_back(static_cast<std::byte>(planners::Ending::kUnknown));
+  auto old_result = wire::from_cdr<GoalResult>(longer);
+  return old_result ? old_result : result;
+}
+
+planners::Ending ending_of(const GoalResult& result) {
+  using planners::Ending;
+  const auto ending = static_cast<Ending>(result.ending());
+  if (ending > Ending::kUnknown && ending <= Ending::kRefused) return ending;
+  if (result.reason() == "cancelled") return Ending::kCancelled;
+  if (result.reason() == "refused") return Ending::kRefused;
+  if (!result.error().empty()) return Ending::kBroken;
+  if (result.success()) return Ending::kSucceeded;
+  return result.reason().starts_with("timeout") ? Ending::kTimedOut : Ending::kFailed;
+}
+
 bool RecordedRun::concluded() const {
-  if (!result || !result->error().empty()) return false;
-  return !result->reason().starts_with("timeout") && result->reason() != "cancelled";
+  if (!result) return false;
+  const planners::Ending ending = ending_of(*result);
+  return ending == planners::Ending::kSucceeded || ending == planners::Ending::kFailed;
 }
 
 Result<std::vector<RecordedRun>> select_runs(std::vector<RecordedRun> runs, const std::string& goal_id) {

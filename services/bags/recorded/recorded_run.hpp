@@ -2,15 +2,28 @@
 /// \file
 /// RecordedRun: all that decided a task, and what was decided, from a bag.
 
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "idl/msg/task.h"
 #include "idl/types/result.hpp"
+#include "planners/execution/execution.hpp"
 #include "services/bags/format/bag_reader.hpp"
 
 namespace jostle::bags {
+
+/// A recorded GoalResult: as it is now, or as it was before `ending` was added at its end, which is
+/// then kUnknown.
+/// Error kInvalidArgument: neither.
+Result<jostle_msgs::msg::GoalResult> result_from_cdr(std::span<const std::byte> data);
+
+/// How a recorded run ended. The one place that reads it from the sentence: results recorded before
+/// there was a field for it (`ending` is kUnknown) began theirs with "timeout", or said "cancelled" or
+/// "refused", and had an error where parts of the system failed.
+planners::Ending ending_of(const jostle_msgs::msg::GoalResult& result);
 
 struct RecordedRun {
   jostle_msgs::msg::TaskRun run;

@@ -1,12 +1,14 @@
 #include "services/bags/replay/recorded_world.hpp"
 
+#include <utility>
+
 #include "robot_bridge/safety/command_check.hpp"
 #include "services/common/process/program.hpp"
 
 namespace jostle::bags {
 
-RecordedWorld::RecordedWorld(const RecordedRun& run, double rate)
-    : run_(run), rate_(rate), start_(std::chrono::steady_clock::now()) {}
+RecordedWorld::RecordedWorld(const RecordedRun& run, std::vector<double> limits, double rate)
+    : run_(run), limits_(std::move(limits)), rate_(rate), start_(std::chrono::steady_clock::now()) {}
 
 double RecordedWorld::time() const { return world::seconds(run_.observations[at_].header()); }
 
@@ -18,8 +20,7 @@ Result<void> RecordedWorld::advance(std::span<const double> u, double duration, 
     over_ = true;
     return Error{Code::kCancelled, "the recording ends here"};
   }
-  const int axes = world::axes_of(run_.observations[at_].q().size()).value_or(static_cast<int>(u.size()));
-  if (auto ok = robot_bridge::check_command(u, axes, duration); !ok) return ok;
+  if (auto ok = robot_bridge::check_command(u, limits_, duration); !ok) return ok;
   ++at_;
   if (rate_ <= 0) return {};
   const std::chrono::duration<double> since(static_cast<double>(run_.observed[at_] - run_.observed[0]) * 1e-9 / rate_);

@@ -20,8 +20,9 @@ namespace jostle::bags {
 /// Threads  one.
 class RecordedWorld {
  public:
-  /// `rate`: recorded seconds per second; 0: as fast as it is asked. The run outlives it.
-  RecordedWorld(const RecordedRun& run, double rate);
+  /// `limits`: of the recorded robot's axes, m/s or rad/s. `rate`: recorded seconds per second; 0: as fast as it is
+  /// asked. The run outlives it.
+  RecordedWorld(const RecordedRun& run, std::vector<double> limits, double rate);
 
   class Robot;
   class Objects;
@@ -34,6 +35,7 @@ class RecordedWorld {
   Result<void> advance(std::span<const double> u, double duration, std::stop_token stop);
 
   const RecordedRun& run_;
+  const std::vector<double> limits_;
   const double rate_;
   const std::chrono::steady_clock::time_point start_;
   std::size_t at_ = 0;  // the present observation

@@ -39,7 +39,7 @@ Result<ReplayReport> replay(const RecordedRun& recorded, const ReplayOptions& op
 
   ReplayReport report{
       .recorded = recorded.run, .here = task::describe_run(goal), .changes = std::move(changes_result).value()};
-  RecordedWorld world(recorded, options.rate);
+  RecordedWorld world(recorded, physics_pool::axis_limits(task.geometry().robot), options.rate);
   RecordedWorld::Robot robot(world);
   RecordedWorld::Objects objects(world);
   const StateLayout& layout = task.geometry().layout;

@@ -9,6 +9,7 @@ Decoders::Decoders(const BagInfo& info) {
     names_.push_back(topic.topic.name);
     reasons_.emplace_back();
     decoders_.emplace_back();
+    earlier_.emplace_back();
     const std::string definition =
         topic.topic.definition.empty() ? definition_of(topic.topic.type).value_or("") : topic.topic.definition;
     if (definition.empty()) {
@@ -19,6 +20,12 @@ Decoders::Decoders(const BagInfo& info) {
     auto decoder_result = Decoder::create(topic.topic.type, definition);
     if (decoder_result) {
       decoders_.back().emplace(std::move(*decoder_result));
+      const auto earlier = topic.topic.definition.empty() ? earlier_definition_of(topic.topic.type) : std::nullopt;
+      if (earlier) {
+        if (auto earlier_result = Decoder::create(topic.topic.type, *earlier)) {
+          earlier_.back().emplace(std::move(*earlier_result));
+        }
+      }
     } else {
       reasons_.back() = fmt::format("{}: {}", topic.topic.name, decoder_result.error().message);
     }
@@ -29,6 +36,9 @@ Result<nlohmann::ordered_json> Decoders::decode(const Message& message) const {
   const auto topic = static_cast<std::size_t>(message.topic);
   auto json_result = decoders_.at(topic)->decode(message.data);
   if (json_result) return json_result;
+  if (earlier_.at(topic)) {
+    if (auto earlier_result = earlier_.at(topic)->decode(message.data)) return earlier_result;
+  }
   return Error{json_result.error().code, fmt::format("{}: message of log time {}: {}", names_[topic], message.log_time,
                                                      json_result.error().message)};
 }

@@ -27,6 +27,7 @@ class Decoders {
  private:
   std::vector<std::string> names_, reasons_;
   std::vector<std::optional<Decoder>> decoders_;
+  std::vector<std::optional<Decoder>> earlier_;  // of bags from before a field was appended
 };
 
 }  // namespace jostle::bags

@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
@@ -23,12 +24,19 @@ namespace {
 constexpr std::chrono::seconds kPatience{2};
 constexpr std::size_t kLastLines = 5;
 
-std::string describe(int status) {
-  if (WIFSIGNALED(status)) return fmt::format("killed by signal {}", WTERMSIG(status));
-  return fmt::format("exit code {}", WEXITSTATUS(status));
+// `status`: of waitpid(2).
+ExitStatus from_system(int status) {
+  if (WIFSIGNALED(status)) return {.signal = WTERMSIG(status)};
+  return {.code = WEXITSTATUS(status)};
 }
 
 }  // namespace
+
+std::string ExitStatus::text() const {
+  if (signal > 0) return fmt::format("killed by signal {} ({})", signal, strsignal(signal));
+  if (code >= 0) return fmt::format("exit code {}", code);
+  return "nobody knows how";
+}
 
 Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
                                          const std::vector<std::string>& arguments, const std::filesystem::path& log) {
@@ -74,17 +82,20 @@ ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
 
 ChildProcess::~ChildProcess() { end(); }
 
-std::optional<std::string> ChildProcess::ended() {
+std::optional<ExitStatus> ChildProcess::reap(int options) {
+  if (pid_ < 0 || ended_) return ended_;
   int status = 0;
-  if (pid_ > 0 && !ended_ && waitpid(pid_, &status, WNOHANG) == pid_) ended_ = describe(status);
+  pid_t reaped = -1;
+  do reaped = waitpid(pid_, &status, options);
+  while (reaped < 0 && errno == EINTR);
+  if (reaped == pid_) ended_ = from_system(status);
+  if (reaped < 0) ended_ = ExitStatus{};  // somebody else waited for it: gone, and how is not known
   return ended_;
 }
 
-std::string ChildProcess::wait() {
-  int status = 0;
-  if (pid_ > 0 && !ended_ && waitpid(pid_, &status, 0) == pid_) ended_ = describe(status);
-  return ended_.value_or("");
-}
+std::optional<ExitStatus> ChildProcess::ended() { return reap(WNOHANG); }
+
+ExitStatus ChildProcess::wait() { return reap(0).value_or(ExitStatus{}); }
 
 void ChildProcess::terminate() {
   if (pid_ > 0 && !ended()) {
@@ -93,7 +104,7 @@ void ChildProcess::terminate() {
   }
 }
 
-std::optional<std::string> ChildProcess::wait_for(std::chrono::milliseconds patience) {
+std::optional<ExitStatus> ChildProcess::wait_for(std::chrono::milliseconds patience) {
   const auto deadline = std::chrono::steady_clock::now() + patience;
   while (pid_ > 0 && !ended() && std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -135,9 +146,9 @@ Result<void> run_tool(const std::string& name, const std::string& package, const
     if (access(program.c_str(), X_OK) != 0) continue;
     auto child_result = ChildProcess::start(program, arguments, log);
     if (!child_result) return child_result.error();
-    const std::string end = child_result->wait();
-    if (end == "exit code 0") return {};
-    return Error{Code::kIo, fmt::format("{}: {}\n{}", name, end, child_result->last_words())};
+    const ExitStatus end = child_result->wait();
+    if (end.ok()) return {};
+    return Error{Code::kIo, fmt::format("{}: {}\n{}", name, end.text(), child_result->last_words())};
   }
   return Error{Code::kNotFound, fmt::format("{}: not found on PATH; install the package {}", name, package)};
 }

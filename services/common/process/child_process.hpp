@@ -14,6 +14,16 @@
 
 namespace jostle::common {
 
+/// How a process ended. Programs are compared by `code` and `signal`; the text is for people.
+struct ExitStatus {
+  int code = -1;   ///< as exit(3) was given it; -1: a signal ended it, or nobody knows how it ended
+  int signal = 0;  ///< that ended it; 0: none
+
+  bool ok() const { return code == 0; }
+  std::string text() const;  ///< "exit code 1", "killed by signal 9 (Killed)"
+  bool operator==(const ExitStatus&) const = default;
+};
+
 /// A running child. It has a process group of its own, so that Ctrl-C in the
 /// terminal reaches only its parent; its output goes to a log file.
 ///
@@ -30,14 +40,14 @@ class ChildProcess {
 
   pid_t pid() const { return pid_; }
 
-  /// How it ended ("killed by signal 9", "exit code 1"), or nothing while it runs.
-  std::optional<std::string> ended();
+  /// How it ended, or nothing while it runs.
+  std::optional<ExitStatus> ended();
 
   /// Waits until it has ended, and says how.
-  std::string wait();
+  ExitStatus wait();
 
   /// The same, for so long at most.
-  std::optional<std::string> wait_for(std::chrono::milliseconds patience);
+  std::optional<ExitStatus> wait_for(std::chrono::milliseconds patience);
 
   /// Whether it has printed that so far.
   bool has_said(const std::string& text) const;
@@ -50,11 +60,12 @@ class ChildProcess {
 
  private:
   ChildProcess(pid_t pid, std::filesystem::path log) : pid_(pid), log_(std::move(log)) {}
+  std::optional<ExitStatus> reap(int options);
   void end();
 
   pid_t pid_ = -1;  // -1: moved from, or seen to have ended
   std::filesystem::path log_;
-  std::optional<std::string> ended_;
+  std::optional<ExitStatus> ended_;
 };
 
 /// Runs a program of the system to its end; it writes to `log`.

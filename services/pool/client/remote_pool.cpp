@@ -73,7 +73,7 @@ RemotePool::RemotePool(const wire::Participant& participant, const RemotePoolOpt
       world_writer_(participant, wire::topics::kPoolWorld),
       control_writer_(participant, wire::topics::kPoolControl),
       result_reader_(participant, wire::topics::kPoolResult,
-                     [this](const msg::TaskResult& result) {
+                     [this](const msg::AssignmentResult& result) {
                        if (result.client() != client_) return;
                        const auto now = std::chrono::steady_clock::now();
                        const std::lock_guard lock(mutex_);
@@ -211,13 +211,13 @@ void RemotePool::dispatch(std::stop_token stop) {
     const std::vector<WorkerId> forgotten = scheduler_.check_silence(now);
     if (scheduler_.usable_workers(now) > 0) last_usable_ = now;
     give_up_without_workers(now);
-    prepare_tasks(now);
+    prepare_assignments(now);
     const Outgoing outgoing = std::exchange(outgoing_, {});
 
     lock.unlock();
     send(outgoing);
     connect(strangers);
-    for (const WorkerId worker : forgotten) task_writers_.erase(worker);
+    for (const WorkerId worker : forgotten) assignment_writers_.erase(worker);
     lock.lock();
   }
 }
@@ -225,7 +225,7 @@ void RemotePool::dispatch(std::stop_token stop) {
 void RemotePool::connect(const std::vector<WorkerId>& workers) {
   for (const WorkerId worker : workers) {
     try {
-      task_writers_.try_emplace(worker, participant_, wire::topics::pool_task(worker));
+      assignment_writers_.try_emplace(worker, participant_, wire::topics::pool_assignment(worker));
     } catch (const wire::SetupError& error) {
       const std::lock_guard lock(mutex_);
       last_refusal_ = error.what();
@@ -234,14 +234,21 @@ void RemotePool::connect(const std::vector<WorkerId>& workers) {
 }
 
 void RemotePool::send(const Outgoing& outgoing) {
-  for (const Control& message : outgoing.controls) control_writer_.write(message);
-  for (const auto& [worker, task] : outgoing.tasks) task_writers_.at(worker).write(task);
+  // News saves work and decides nothing: without it workers simulate what nobody needs any more.
+  for (const Control& message : outgoing.controls) (void)control_writer_.write(message);
+  for (const auto& [worker, assignment] : outgoing.assignments) {
+    if (assignment_writers_.at(worker).write(assignment)) continue;
+    // Its samples are sent again once the worker's heartbeats say that they are not there.
+    const std::lock_guard lock(mutex_);
+    last_refusal_ = fmt::format("worker {:016x}: the middleware did not take {} samples for it", worker,
+                                assignment.samples().size());
+  }
 }
 
 void RemotePool::absorb_heartbeats(wire::TimePoint now, std::vector<WorkerId>& strangers) {
   for (const msg::WorkerHeartbeat& heartbeat : std::exchange(heartbeats_, {})) {
-    const auto writer = task_writers_.find(heartbeat.worker());
-    if (writer == task_writers_.end()) strangers.push_back(heartbeat.worker());
+    const auto writer = assignment_writers_.find(heartbeat.worker());
+    if (writer == assignment_writers_.end()) strangers.push_back(heartbeat.worker());
     const auto us = std::ranges::find(heartbeat.clients(), client_, [](const auto& load) { return load.client(); });
     const bool hears_us = us != heartbeat.clients().end();
     std::uint64_t others = 0;
@@ -249,7 +256,7 @@ void RemotePool::absorb_heartbeats(wire::TimePoint now, std::vector<WorkerId>& s
     scheduler_.heard({.worker = heartbeat.worker(),
                       .name = heartbeat.name(),
                       .capacity = static_cast<int>(std::min<std::uint32_t>(heartbeat.capacity(), INT32_MAX)),
-                      .ready = hears_us && writer != task_writers_.end() && writer->second.matched() > 0,
+                      .ready = hears_us && writer != assignment_writers_.end() && writer->second.matched() > 0,
                       .samples = hears_us ? us->samples() : 0,
                       .others = others},
                      now);
@@ -265,7 +272,7 @@ void RemotePool::absorb_results(wire::TimePoint now) {
 void RemotePool::trace(const Received& received, bool first) const {
   if (!options_.on_sample) return;
   const auto seconds = [](std::int64_t nanoseconds) { return 1e-9 * static_cast<double>(nanoseconds); };
-  const msg::TaskResult& result = received.result;
+  const msg::AssignmentResult& result = received.result;
   options_.on_sample({.client = client_,
                       .worker = result.worker(),
                       .epoch = result.epoch(),
@@ -282,7 +289,7 @@ void RemotePool::trace(const Received& received, bool first) const {
 }
 
 void RemotePool::absorb(const Received& received, wire::TimePoint now) {
-  const msg::TaskResult& result = received.result;
+  const msg::AssignmentResult& result = received.result;
   const auto found = active_.find(result.epoch());
   if (found == active_.end()) {
     scheduler_.accept(result.worker(), result.epoch(), result.sample(), 0, now);  // late: counted
@@ -334,19 +341,19 @@ void RemotePool::adopt(Active& active, RolloutOutcome outcome) {
   active.reply.outcomes[sample - active.batch.first_sample] = std::move(outcome);
 }
 
-void RemotePool::prepare_tasks(wire::TimePoint now) {
+void RemotePool::prepare_assignments(wire::TimePoint now) {
   for (const Assignment& assignment : scheduler_.assign(now)) {
     const Active& active = *active_.at(assignment.epoch);
-    Task task;
-    task.client(client_);
-    task.epoch(assignment.epoch);
-    task.attempt(assignment.attempt);
-    task.batch(active.wire);
-    task.best_cost(active.best_cost);
-    task.first_success(active.first_success);
-    task.samples(assignment.samples);
-    task.sent(std::chrono::nanoseconds(now.time_since_epoch()).count());
-    outgoing_.tasks.emplace_back(assignment.worker, std::move(task));
+    AssignmentMessage message;
+    message.client(client_);
+    message.epoch(assignment.epoch);
+    message.attempt(assignment.attempt);
+    message.batch(active.wire);
+    message.best_cost(active.best_cost);
+    message.first_success(active.first_success);
+    message.samples(assignment.samples);
+    message.sent(std::chrono::nanoseconds(now.time_since_epoch()).count());
+    outgoing_.assignments.emplace_back(assignment.worker, std::move(message));
   }
 }
 

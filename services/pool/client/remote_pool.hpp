@@ -34,7 +34,7 @@ struct RemotePoolOptions {
 ///
 /// Threads  safe from any thread. One thread of its own sends everything.
 /// Errors   besides those of Pool: kUnavailable when no worker could be used
-///          for `no_worker_timeout`. A worker's refusal of a task is the
+///          for `no_worker_timeout`. A worker's refusal of an assignment is the
 ///          batch's error; it names the worker.
 /// Failure  a worker that dies, stalls or cannot do its work loses nothing:
 ///          its samples go to others.
@@ -55,15 +55,15 @@ class RemotePool final : public physics_pool::AsyncPool {
   struct Active;
   class Underway;
   using Control = jostle_msgs::msg::BatchControl;
-  using Task = jostle_msgs::msg::Task;
+  using AssignmentMessage = jostle_msgs::msg::Assignment;
   struct Received {
-    jostle_msgs::msg::TaskResult result;
+    jostle_msgs::msg::AssignmentResult result;
     physics_pool::TimePoint at;
   };
   /// What leaves in one turn of the dispatcher.
   struct Outgoing {
     std::vector<Control> controls;
-    std::vector<std::pair<WorkerId, Task>> tasks;
+    std::vector<std::pair<WorkerId, AssignmentMessage>> assignments;
   };
 
   Error no_worker() const;
@@ -77,7 +77,7 @@ class RemotePool final : public physics_pool::AsyncPool {
   void absorb(const Received& received, physics_pool::TimePoint now);
   void trace(const Received& received, bool first) const;
   void adopt(Active& active, physics_pool::RolloutOutcome outcome);
-  void prepare_tasks(physics_pool::TimePoint now);
+  void prepare_assignments(physics_pool::TimePoint now);
   void finish(Active& active, Result<physics_pool::BatchReply> reply);
   void forget(Active& active);
   void kick();
@@ -104,9 +104,9 @@ class RemotePool final : public physics_pool::AsyncPool {
 
   wire::Writer<jostle_msgs::msg::WorldDescription> world_writer_;
   wire::Writer<Control> control_writer_;
-  std::map<WorkerId, wire::Writer<Task>> task_writers_;  // of the dispatcher alone
+  std::map<WorkerId, wire::Writer<AssignmentMessage>> assignment_writers_;  // of the dispatcher alone
   // Readers and the dispatcher use all of the above: last made, first gone.
-  wire::Reader<jostle_msgs::msg::TaskResult> result_reader_;
+  wire::Reader<jostle_msgs::msg::AssignmentResult> result_reader_;
   wire::Reader<jostle_msgs::msg::WorkerHeartbeat> heartbeat_reader_;
   std::jthread dispatcher_;
 };

@@ -18,7 +18,7 @@ constexpr double kMostCover = 16.0;                     // samples per thread, h
 constexpr std::uint64_t kUrgentInARow = 7;              // samples, while a normal batch has some to hand out
 constexpr std::uint8_t kCopies = 2;                     // of one sample at a time
 constexpr double kSlow = 2.0;                           // times the typical time: worth a copy
-constexpr int kEmptyHeartbeats = 2;                     // the first may have crossed a task on its way
+constexpr int kEmptyHeartbeats = 2;                     // the first may have crossed an assignment on its way
 
 }  // namespace
 

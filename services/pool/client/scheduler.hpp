@@ -18,7 +18,7 @@ using physics_pool::TimePoint;
 using WorkerId = std::uint64_t;  ///< random, new with every process
 using Epoch = std::uint64_t;     ///< one batch of this client
 
-/// Samples of one batch for one worker, to be sent as one task.
+/// Samples of one batch for one worker, to be sent as one message.
 struct Assignment {
   WorkerId worker = 0;
   Epoch epoch = 0;

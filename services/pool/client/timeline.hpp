@@ -16,8 +16,8 @@ struct SampleTrace {
   std::string worker_name;
   std::uint32_t thread = 0, sample = 0, attempt = 0;
   bool first = true;                                    ///< false: its result came late or twice and was dropped
-  double sent = 0.0, received = 0.0;                    ///< task and result, client's clock
-  double arrived = 0.0, started = 0.0, finished = 0.0;  ///< task and sample, worker's clock
+  double sent = 0.0, received = 0.0;                    ///< assignment and result, client's clock
+  double arrived = 0.0, started = 0.0, finished = 0.0;  ///< assignment and sample, worker's clock
 };
 
 /// How far a worker's clock W is ahead of the client's C, from messages both ways.
@@ -56,14 +56,14 @@ struct Timeline {
   /// A sample on its thread, client's clock.
   struct Bar {
     int row = 0;
-    double from = 0.0, to = 0.0;  ///< s since the first task was sent
+    double from = 0.0, to = 0.0;  ///< s since the first assignment was sent
     std::uint64_t client = 0, epoch = 0;
     bool first = true;
   };
 
   std::vector<Row> rows;     ///< by worker, then thread
   std::vector<Bar> bars;     ///< by row, then time
-  double length = 0.0;       ///< s from the first task sent to the last result received
+  double length = 0.0;       ///< s from the first assignment sent to the last result received
   double efficiency = 0.0;   ///< busy of available time, all rows
   double clock_error = 0.0;  ///< s, of the worker whose clock is known worst
   double on_the_way = 0.0;   ///< s, median per sample: from sent to received, less the time at the worker

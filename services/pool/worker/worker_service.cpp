@@ -1,6 +1,7 @@
 #include "services/pool/worker/worker_service.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,7 +23,8 @@ namespace {
 
 constexpr std::chrono::seconds kWorldPatience{5};  // a latched text arrives in milliseconds
 constexpr std::chrono::milliseconds kRetry{20};    // while a world is waited for
-constexpr std::size_t kArrivals = 1024;            // unread tasks; credit keeps honest clients far below
+constexpr std::size_t kArrivals = 1024;            // unread assignments; credit keeps honest clients far below
+constexpr std::chrono::seconds kComplaints{1};     // between two log lines about losses
 constexpr std::size_t kCancelled = 64;             // cancelled batches remembered
 
 std::int64_t nanoseconds(std::chrono::steady_clock::time_point time) {
@@ -35,19 +37,19 @@ std::string host_name() {
   return name;
 }
 
-Result<void> check_samples(const msg::Task& task) {
-  const std::uint32_t first = task.batch().first_sample(), count = task.batch().samples();
-  if (task.samples().empty() || task.samples().size() > count) {
+Result<void> check_samples(const msg::Assignment& assignment) {
+  const std::uint32_t first = assignment.batch().first_sample(), count = assignment.batch().samples();
+  if (assignment.samples().empty() || assignment.samples().size() > count) {
     return Error{Code::kInvalidArgument,
-                 fmt::format("task.samples: got {} of them, wanted 1 to {}", task.samples().size(), count)};
+                 fmt::format("assignment.samples: got {} of them, wanted 1 to {}", assignment.samples().size(), count)};
   }
-  for (const std::uint32_t sample : task.samples()) {
+  for (const std::uint32_t sample : assignment.samples()) {
     if (sample >= first && sample - first < count) continue;
-    return Error{Code::kInvalidArgument,
-                 fmt::format("task.samples: got {}, wanted {} to {}", sample, first, std::uint64_t{first} + count - 1)};
+    return Error{Code::kInvalidArgument, fmt::format("assignment.samples: got {}, wanted {} to {}", sample, first,
+                                                     std::uint64_t{first} + count - 1)};
   }
-  if (std::isnan(task.best_cost())) {
-    return Error{Code::kInvalidArgument, "task.best_cost: got NaN, wanted a cost or +inf"};
+  if (std::isnan(assignment.best_cost())) {
+    return Error{Code::kInvalidArgument, "assignment.best_cost: got NaN, wanted a cost or +inf"};
   }
   return {};
 }
@@ -68,15 +70,18 @@ WorkerService::WorkerService(const wire::Participant& participant, const WorkerO
                     }),
       control_reader_(participant, wire::topics::kPoolControl,
                       [this](const msg::BatchControl& control) { obey(control); }),
-      task_reader_(participant, wire::topics::pool_task(id_),
-                   [this](const Task& task) {
-                     const std::lock_guard lock(mutex_);
-                     if (arrivals_.size() == kArrivals) return;
-                     arrivals_.push_back({task, std::chrono::steady_clock::now()});
-                     loads_[task.client()] += static_cast<std::uint32_t>(task.samples().size());
-                     kicked_ = true;
-                     wake_.notify_one();
-                   }),
+      assignment_reader_(participant, wire::topics::pool_assignment(id_),
+                         [this](const Assignment& assignment) {
+                           const std::lock_guard lock(mutex_);
+                           if (arrivals_.size() >= kArrivals) {
+                             ++refused_;
+                             return;
+                           }
+                           arrivals_.push_back({assignment, std::chrono::steady_clock::now()});
+                           loads_[assignment.client()] += static_cast<std::uint32_t>(assignment.samples().size());
+                           kicked_ = true;
+                           wake_.notify_one();
+                         }),
       server_([this](std::stop_token stop) { serve(stop); }),
       heart_([this](std::stop_token stop) { beat(stop); }) {}
 
@@ -100,16 +105,16 @@ void WorkerService::serve(std::stop_token stop) {
   }
 }
 
-// Judges a task; what is wrong with it goes back, what is right gets in line.
+// Judges an assignment; what is wrong with it goes back, what is right gets in line.
 void WorkerService::examine(const Arrival& arrival) {
-  const Task& task = arrival.task;
-  RolloutBatch batch = wire::from_wire(task.batch());
-  if (auto ok = physics_pool::validate(batch); !ok) return refuse(task, ok.error());
-  if (auto ok = check_samples(task); !ok) return refuse(task, ok.error());
+  const Assignment& assignment = arrival.assignment;
+  RolloutBatch batch = wire::from_wire(assignment.batch());
+  if (auto ok = physics_pool::validate(batch); !ok) return refuse(assignment, ok.error());
+  if (auto ok = check_samples(assignment); !ok) return refuse(assignment, ok.error());
   const auto world_result = worlds_.find(batch.world);
   if (!world_result) {
     if (std::chrono::steady_clock::now() - arrival.arrived > kWorldPatience) {
-      return refuse(task,
+      return refuse(assignment,
                     Error{Code::kUnknownWorld,
                           fmt::format("world: got {}, whose text did not arrive in {} s on {}", to_string(batch.world),
                                       kWorldPatience.count(), wire::topics::kPoolWorld.name)});
@@ -118,20 +123,20 @@ void WorkerService::examine(const Arrival& arrival) {
     arrivals_.push_back(arrival);
     return;
   }
-  if (!*world_result) return refuse(task, world_result->error());
+  if (!*world_result) return refuse(assignment, world_result->error());
   const WorldPtr& world = world_result->value();
   if (auto ok = physics_pool::validate(batch, world->geometry().layout, world->time_step()); !ok) {
-    return refuse(task, ok.error());
+    return refuse(assignment, ok.error());
   }
   accept(arrival, std::move(batch), world);
 }
 
 void WorkerService::accept(const Arrival& arrival, RolloutBatch batch, WorldPtr world) {
   const std::lock_guard lock(mutex_);
-  const Task& task = arrival.task;
-  const BatchId id{task.client(), task.epoch()};
+  const Assignment& assignment = arrival.assignment;
+  const BatchId id{assignment.client(), assignment.epoch()};
   if (std::ranges::find(cancelled_, id) != cancelled_.end()) {
-    loads_[task.client()] -= static_cast<std::uint32_t>(task.samples().size());
+    loads_[assignment.client()] -= static_cast<std::uint32_t>(assignment.samples().size());
     return;
   }
   Running& running = running_[id];
@@ -143,32 +148,35 @@ void WorkerService::accept(const Arrival& arrival, RolloutBatch batch, WorldPtr 
       finish(id, outcome, shift);
     };
   }
-  running.run->signals.offer_cost(task.best_cost());
-  running.run->signals.offer_success(task.first_success());
-  for (const std::uint32_t sample : task.samples()) {
-    const Job job{
-        .client = task.client(), .epoch = task.epoch(), .sample = sample, .priority = running.run->batch.priority};
-    const Held held{.job = job, .attempt = task.attempt(), .sent = task.sent(), .arrived = arrival.arrived};
+  running.run->signals.offer_cost(assignment.best_cost());
+  running.run->signals.offer_success(assignment.first_success());
+  for (const std::uint32_t sample : assignment.samples()) {
+    const Job job{.client = assignment.client(),
+                  .epoch = assignment.epoch(),
+                  .sample = sample,
+                  .priority = running.run->batch.priority};
+    const Held held{.job = job, .attempt = assignment.attempt(), .sent = assignment.sent(), .arrived = arrival.arrived};
     if (running.samples.try_emplace(sample, held).second) {
       turns_.wait(job);
     } else {
-      --loads_[task.client()];  // already here
+      --loads_[assignment.client()];  // already here
     }
   }
 }
 
-void WorkerService::refuse(const Task& task, const Error& error) {
-  msg::TaskResult result;
-  result.client(task.client());
+void WorkerService::refuse(const Assignment& assignment, const Error& error) {
+  msg::AssignmentResult result;
+  result.client(assignment.client());
   result.worker(id_);
-  result.epoch(task.epoch());
-  result.attempt(task.attempt());
-  result.sample(task.samples().empty() ? task.batch().first_sample() : task.samples().front());
+  result.epoch(assignment.epoch());
+  result.attempt(assignment.attempt());
+  result.sample(assignment.samples().empty() ? assignment.batch().first_sample() : assignment.samples().front());
   result.error(error.message);
   result.error_code(static_cast<std::uint8_t>(error.code));
-  result_writer_.write(result);
+  const bool sent = result_writer_.write(result);
   const std::lock_guard lock(mutex_);
-  loads_[task.client()] -= static_cast<std::uint32_t>(task.samples().size());
+  if (!sent) ++lost_results_;
+  loads_[assignment.client()] -= static_cast<std::uint32_t>(assignment.samples().size());
 }
 
 // Gives every free thread a sample. No earlier: a sample that comes while the
@@ -189,11 +197,12 @@ void WorkerService::feed() {
 void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, const physics_pool::Shift& shift) {
   const bool skipped =
       outcome.end == physics_pool::End::kSkipped;  // cancelled, or the client knows of the success that did it
+  bool sent = true;
   std::unique_lock lock(mutex_);
   const Held held = release(batch, outcome.sample);
   lock.unlock();
   if (!skipped) {
-    msg::TaskResult result = wire::to_wire(outcome);
+    msg::AssignmentResult result = wire::to_wire(outcome);
     result.client(batch.first);
     result.worker(id_);
     result.epoch(batch.second);
@@ -203,9 +212,10 @@ void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, 
     result.started(nanoseconds(shift.started));
     result.finished(nanoseconds(shift.finished));
     result.thread(static_cast<std::uint32_t>(shift.thread));
-    result_writer_.write(result);
+    sent = result_writer_.write(result);
   }
   lock.lock();
+  if (!sent) ++lost_results_;
   --loads_[batch.first];  // after the answer: a client may trust "nothing of yours is here"
   ++rollouts_;
   engine_steps_ += outcome.engine_steps;
@@ -252,11 +262,34 @@ void WorkerService::beat(std::stop_token stop) {
   do {
     const std::vector<std::uint64_t> clients = result_writer_.matched_participants();
     drop_lost_clients(clients);
-    heartbeat_writer_.write(heartbeat(clients));
+    (void)heartbeat_writer_.write(heartbeat(clients));  // the next one comes soon; five lost ones make us dead
+    say_losses();
   } while (common::pause_until(std::chrono::steady_clock::now() + kHeartbeatPeriod, stop));
   msg::WorkerHeartbeat leave = heartbeat({});
   leave.capacity(0);
-  heartbeat_writer_.write(leave);
+  (void)heartbeat_writer_.write(leave);  // politeness: our silence says the same, later
+}
+
+// On this thread, not where they happen: a log may block.
+void WorkerService::say_losses() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_complaint_) return;
+  std::unique_lock lock(mutex_);
+  const std::uint64_t lost_results = lost_results_, refused = refused_;
+  lock.unlock();
+  if (lost_results == said_lost_results_ && refused == said_refused_) return;
+  next_complaint_ = now + kComplaints;
+  if (lost_results > said_lost_results_) {
+    spdlog::warn("{}: {} results were not taken by the middleware and are lost; their samples will be run again", name_,
+                 lost_results - said_lost_results_);
+  }
+  if (refused > said_refused_) {
+    spdlog::warn(
+        "{}: {} assignments were dropped, for {} were unread or waited for their worlds; clients send them again",
+        name_, refused - said_refused_, kArrivals);
+  }
+  said_lost_results_ = lost_results;
+  said_refused_ = refused;
 }
 
 void WorkerService::drop_lost_clients(const std::vector<std::uint64_t>& clients) {
@@ -280,6 +313,7 @@ msg::WorkerHeartbeat WorkerService::heartbeat(const std::vector<std::uint64_t>& 
   const std::lock_guard lock(mutex_);
   message.rollouts(rollouts_);
   message.engine_steps(engine_steps_);
+  message.refused(refused_);
   for (const std::uint64_t client : clients) {
     msg::ClientLoad load;
     load.client(client);

@@ -26,15 +26,18 @@ struct WorkerOptions {
   std::vector<int> cores;  ///< of each simulating thread; empty: wherever the system likes
 };
 
-/// Takes tasks, runs their samples, answers each. Clients and priorities share the
+/// Takes assignments, runs their samples, answers each. Clients and priorities share the
 /// threads by turns.hpp; whose sample runs is decided when a thread is free, not before.
 ///
-/// Threads  `threads` that simulate; one that checks tasks, compiles worlds and
+/// Threads  `threads` that simulate; one that checks assignments, compiles worlds and
 ///          deals samples out; one for heartbeats, so that a worker deep in
 ///          physics is still heard.
-/// Failure  a bad task is answered with an error that names the field; a task
+/// Failure  a bad assignment is answered with an error that names the field; an assignment
 ///          whose world does not arrive in 5 s likewise. A client that is gone
-///          has its samples dropped.
+///          has its samples dropped. A result that the middleware does not take is lost
+///          and counted; its client sends the sample again, or to another worker. So it is
+///          with assignments beyond 1024 that were not looked at or wait for their worlds;
+///          the heartbeat says how many.
 class WorkerService {
  public:
   WorkerService(const wire::Participant& participant, const WorkerOptions& options);
@@ -45,17 +48,17 @@ class WorkerService {
   const std::string& name() const { return name_; }
 
  private:
-  using Task = jostle_msgs::msg::Task;
+  using Assignment = jostle_msgs::msg::Assignment;
   using TimePoint = std::chrono::steady_clock::time_point;
 
   /// Names a batch: client and epoch.
   using BatchId = std::pair<std::uint64_t, std::uint64_t>;
-  /// A task that was not looked at yet, or waits for its world.
+  /// An assignment that was not looked at yet, or waits for its world.
   struct Arrival {
-    Task task;
+    Assignment assignment;
     TimePoint arrived;
   };
-  /// A sample that waits or runs, and what its answer repeats of its task.
+  /// A sample that waits or runs, and what its answer repeats of its assignment.
   struct Held {
     Job job;
     std::uint32_t attempt = 0;
@@ -71,13 +74,14 @@ class WorkerService {
   void serve(std::stop_token stop);
   void examine(const Arrival& arrival);
   void accept(const Arrival& arrival, physics_pool::RolloutBatch batch, physics_pool::WorldPtr world);
-  void refuse(const Task& task, const Error& error);
+  void refuse(const Assignment& assignment, const Error& error);
   void feed();
   void finish(const BatchId& batch, const physics_pool::RolloutOutcome& outcome, const physics_pool::Shift& shift);
   Held release(const BatchId& batch, std::uint32_t sample);
   void obey(const jostle_msgs::msg::BatchControl& control);
   void cancel(const BatchId& batch);
   void beat(std::stop_token stop);
+  void say_losses();
   void drop_lost_clients(const std::vector<std::uint64_t>& clients);
   jostle_msgs::msg::WorkerHeartbeat heartbeat(const std::vector<std::uint64_t>& clients) const;
 
@@ -93,19 +97,25 @@ class WorkerService {
   Turns turns_;
   std::map<BatchId, Running> running_;
   std::map<std::uint64_t, std::uint32_t> loads_;  // samples per client: arrived, waiting, running
-  std::deque<BatchId> cancelled_;                 // lately; a task may come after its cancellation
+  std::deque<BatchId> cancelled_;                 // lately; an assignment may come after its cancellation
   int dealt_ = 0;                                 // samples with the executor: one per busy thread
   std::uint64_t rollouts_ = 0;
   std::uint64_t engine_steps_ = 0;
+  std::uint64_t refused_ = 0;       // assignments that came when too many were unread
+  std::uint64_t lost_results_ = 0;  // that the middleware did not take
   bool kicked_ = false;
 
-  wire::Writer<jostle_msgs::msg::TaskResult> result_writer_;
+  // Of the heart alone.
+  std::uint64_t said_lost_results_ = 0, said_refused_ = 0;
+  TimePoint next_complaint_;
+
+  wire::Writer<jostle_msgs::msg::AssignmentResult> result_writer_;
   wire::Writer<jostle_msgs::msg::WorkerHeartbeat> heartbeat_writer_;
   physics_pool::Executor executor_;
   // Readers and threads use all of the above: last made, first gone.
   wire::Reader<jostle_msgs::msg::WorldDescription> world_reader_;
   wire::Reader<jostle_msgs::msg::BatchControl> control_reader_;
-  wire::Reader<Task> task_reader_;
+  wire::Reader<Assignment> assignment_reader_;
   std::jthread server_;
   std::jthread heart_;
 };

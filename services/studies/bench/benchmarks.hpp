@@ -73,7 +73,7 @@ Result<Measurements> measure_bag(const Settings& settings);
 /// time it takes as heard here against the time it has in the bag, ms.
 Result<Measurements> measure_play(const Settings& settings);
 
-/// The other process of `round-trip`: answers every task until it is told to
+/// The other process of `round-trip`: answers every assignment until it is told to
 /// end. Returns the exit code.
 int serve_echo(int domain, std::stop_token stop);
 

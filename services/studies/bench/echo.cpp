@@ -19,8 +19,8 @@ constexpr std::chrono::milliseconds kGreeting{100};
 constexpr std::size_t kUnread = 1024;  // answers; windows are smaller
 
 // Type and promise of the pool's own, and nobody else's name.
-const wire::Topic<msg::Task> kPing{"rt/bench/ping", kTask};
-const wire::Topic<msg::TaskResult> kPong{"rt/bench/pong", kTask};
+const wire::Topic<msg::Assignment> kPing{"rt/bench/ping", kTask};
+const wire::Topic<msg::AssignmentResult> kPong{"rt/bench/pong", kTask};
 
 }  // namespace
 
@@ -34,11 +34,11 @@ Sample Trips::finish(const Hash& hash) {
 
 Echo::Echo(const wire::Participant& participant) : ping_(participant, kPing), pong_(participant, kPong, kUnread) {}
 
-Result<void> Echo::meet(Task task, Helpers& helpers) {
+Result<void> Echo::meet(Assignment assignment, Helpers& helpers) {
   const auto deadline = Clock::now() + kMeeting;
   do {
-    task.epoch(++epoch_);
-    ping_.write(task);
+    assignment.epoch(++epoch_);
+    (void)ping_.write(assignment);  // greeted again until somebody answers
     if (pong_.take(Clock::now() + kGreeting)) return {};
   } while (Clock::now() < deadline);
   return Error{Code::kUnavailable, fmt::format("echo: no answer in {} s {}", kMeeting.count(), helpers.casualty())};
@@ -53,32 +53,32 @@ Result<Echo::Answer> Echo::answer_since(std::uint64_t epoch) {
   return Error{Code::kUnavailable, fmt::format("echo: no answer to ping {} in {} s", epoch, kLost.count())};
 }
 
-Result<Echo::Answer> Echo::ask(Task& task) {
-  task.epoch(++epoch_);
-  ping_.write(task);
+Result<Echo::Answer> Echo::ask(Assignment& assignment) {
+  assignment.epoch(++epoch_);
+  (void)ping_.write(assignment);  // a lost one is an answer that does not come
   return answer_since(epoch_);
 }
 
-Result<void> Echo::stream(Task& task, int count, int window) {
+Result<void> Echo::stream(Assignment& assignment, int count, int window) {
   const std::uint64_t first = epoch_ + 1;
   int answered = 0;
   for (int sent = 0; answered < count; ++answered) {
     for (; sent < count && sent - answered < window; ++sent) {
-      task.epoch(++epoch_);
-      ping_.write(task);
+      assignment.epoch(++epoch_);
+      (void)ping_.write(assignment);  // likewise
     }
     if (auto answer = answer_since(first); !answer) return answer.error();
   }
   return {};
 }
 
-msg::Task task_of(const physics_pool::RolloutBatch& batch) {
-  msg::Task task;
-  task.batch(wire::to_wire(batch));
-  task.best_cost(physics_pool::kInfinity);
-  task.first_success(UINT32_MAX);
-  task.samples({batch.first_sample});
-  return task;
+msg::Assignment assignment_of(const physics_pool::RolloutBatch& batch) {
+  msg::Assignment assignment;
+  assignment.batch(wire::to_wire(batch));
+  assignment.best_cost(physics_pool::kInfinity);
+  assignment.first_success(UINT32_MAX);
+  assignment.samples({batch.first_sample});
+  return assignment;
 }
 
 physics_pool::RolloutOutcome empty_outcome(std::uint32_t sample) {
@@ -92,13 +92,13 @@ int serve_echo(int domain, std::stop_token stop) {
     fmt::print(stderr, "jostle bench: {}\n", participant_result.error().message);
     return common::kExitBroken;
   }
-  wire::Writer<msg::TaskResult> pong(*participant_result, kPong);
-  const wire::Reader<msg::Task> ping(*participant_result, kPing, [&](const msg::Task& task) {
-    msg::TaskResult result = wire::to_wire(empty_outcome(task.samples().front()));
-    result.client(task.client());
-    result.epoch(task.epoch());
-    if (task.batch().want_all_trajectories()) result.trajectory(task.batch().nominal());
-    pong.write(result);
+  wire::Writer<msg::AssignmentResult> pong(*participant_result, kPong);
+  const wire::Reader<msg::Assignment> ping(*participant_result, kPing, [&](const msg::Assignment& assignment) {
+    msg::AssignmentResult result = wire::to_wire(empty_outcome(assignment.samples().front()));
+    result.client(assignment.client());
+    result.epoch(assignment.epoch());
+    if (assignment.batch().want_all_trajectories()) result.trajectory(assignment.batch().nominal());
+    (void)pong.write(result);  // likewise, at the asker's
   });
   common::wait_for(std::move(stop));
   return common::kExitOk;

@@ -33,35 +33,35 @@ class Trips {
 };
 
 /// This process's end; serve_echo() is the other's. Topics of the pool's type and promise
-/// under names of their own. A task that wants all trajectories gets its nominal controls
+/// under names of their own. An assignment that wants all trajectories gets its nominal controls
 /// back as one, so that as much returns as was sent; others get an empty outcome.
 class Echo {
  public:
-  using Task = jostle_msgs::msg::Task;
-  using Answer = jostle_msgs::msg::TaskResult;
+  using Assignment = jostle_msgs::msg::Assignment;
+  using Answer = jostle_msgs::msg::AssignmentResult;
 
   explicit Echo(const wire::Participant& participant);
 
   /// Sends until an answer comes: only that shows that both directions work. Errors
   /// kUnavailable, with the last words of a helper that ended.
-  Result<void> meet(Task task, Helpers& helpers);
+  Result<void> meet(Assignment assignment, Helpers& helpers);
 
   /// One round trip.
-  Result<Answer> ask(Task& task);
+  Result<Answer> ask(Assignment& assignment);
 
   /// `count` of them, no more than `window` under way.
-  Result<void> stream(Task& task, int count, int window);
+  Result<void> stream(Assignment& assignment, int count, int window);
 
  private:
   Result<Answer> answer_since(std::uint64_t epoch);
 
-  wire::Writer<Task> ping_;
+  wire::Writer<Assignment> ping_;
   wire::Inbox<Answer> pong_;
   std::uint64_t epoch_ = 0;  // of the newest question
 };
 
 /// The message that the pool sends for the first sample of such a batch.
-jostle_msgs::msg::Task task_of(const physics_pool::RolloutBatch& batch);
+jostle_msgs::msg::Assignment assignment_of(const physics_pool::RolloutBatch& batch);
 
 /// What a worker answers to an empty sample.
 physics_pool::RolloutOutcome empty_outcome(std::uint32_t sample);

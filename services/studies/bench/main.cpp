@@ -32,7 +32,7 @@ constexpr auto kBenchmarks = std::to_array<Benchmark>({
     {"play", "a bag as a subscriber hears it against the bag, at rates from 0.1 to 10", 3, measure_play},
     {"pool-threads", "ThreadPool against bare loops of engine steps", 15, measure_pool_threads},
     {"pool-dds", "two worker processes against two bare loops", 15, measure_pool_dds},
-    {"round-trip", "an empty task through the pool against a bare Fast DDS echo", 25, measure_round_trip},
+    {"round-trip", "an empty assignment through the pool against a bare Fast DDS echo", 25, measure_round_trip},
     {"early-stop", "a batch that stops its losers against one that does not", 5, measure_early_stop},
     {"scheduling", "waiting workers against workers that never idle", 5, measure_scheduling},
     {"coarse-models", "coarse models against the fine one, per control step", 9, measure_coarse_models},

@@ -212,9 +212,8 @@ class PlayBench {
         return Error{Code::kUnavailable, "jostle_play: does not end: " + player_result->last_words()};
       usleep(20'000);
     }
-    if (player_result->ended() != "exit code 0") {
-      return Error{Code::kUnavailable,
-                   fmt::format("jostle_play: {}: {}", *player_result->ended(), player_result->last_words())};
+    if (const common::ExitStatus ended = *player_result->ended(); !ended.ok()) {
+      return Error{Code::kUnavailable, fmt::format("jostle_play: {}: {}", ended.text(), player_result->last_words())};
     }
     for (const auto last = Clock::now() + kLastOnes; subscriber_->count() < kMessages && Clock::now() < last;)
       usleep(1000);

@@ -126,7 +126,7 @@ std::string headline(const pool::Timeline& timeline, const PoolTimelineOptions& 
 
 common::LaneChart chart_of(const pool::Timeline& timeline, const Legend& legend, const std::string& title) {
   common::LaneChart chart{.title = title,
-                          .x_label = "ms since the first task was sent",
+                          .x_label = "ms since the first assignment was sent",
                           .series = legend.series,
                           .length = milliseconds(timeline.length)};
   const bool threads =

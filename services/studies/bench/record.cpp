@@ -193,9 +193,9 @@ Result<common::ChildProcess> start_recorder(const fs::path& folder, int domain) 
 Result<void> stop_recorder(common::ChildProcess& recorder) {
   recorder.terminate();
   const auto ended = recorder.wait_for(kPatience);
-  if (ended && *ended == "exit code 0") return {};
+  if (ended && ended->ok()) return {};
   return Error{Code::kUnavailable,
-               fmt::format("the recorder: {}\n{}", ended.value_or("does not end"), recorder.last_words())};
+               fmt::format("the recorder: {}\n{}", ended ? ended->text() : "does not end", recorder.last_words())};
 }
 
 Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) {
@@ -214,9 +214,8 @@ Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) 
     if (options.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
     if (Clock::now() - begin > patience) return Error{Code::kUnavailable, "the publisher does not end"};
   }
-  if (*publisher_result->ended() != "exit code 0") {
-    return Error{Code::kUnavailable,
-                 "the publisher: " + *publisher_result->ended() + "\n" + publisher_result->last_words()};
+  if (const common::ExitStatus ended = *publisher_result->ended(); !ended.ok()) {
+    return Error{Code::kUnavailable, "the publisher: " + ended.text() + "\n" + publisher_result->last_words()};
   }
   if (auto ok = stop_recorder(*recorder_result); !ok) return ok.error();
   auto published_result = read_json(words), recorded_result = read_json(bag.string() + ".json");
@@ -286,9 +285,9 @@ Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder,
   while (!run_result->ended()) {
     if (auto ok = meanwhile(*run_result); !ok) return ok.error();
   }
-  const std::string ended = *run_result->ended();
-  if (ended != "exit code 0" && ended != "exit code 1") {  // 1: no plan is good enough, by intent
-    return Error{Code::kUnavailable, "the run: " + ended + "\n" + run_result->last_words()};
+  const common::ExitStatus ended = *run_result->ended();
+  if (!ended.ok() && ended.code != common::kExitFailed) {  // failed: no plan is good enough, by intent
+    return Error{Code::kUnavailable, "the run: " + ended.text() + "\n" + run_result->last_words()};
   }
   auto report_result = read_json(result);
   if (!report_result) return report_result.error();

@@ -32,11 +32,11 @@ Result<Sample> through_pool(pool::RemotePool& pool, const RolloutBatch& batch, i
   return trips.finish(hash_of_answers(answers));
 }
 
-Result<Sample> through_echo(Echo& echo, msg::Task task, int count, Trips& trips) {
+Result<Sample> through_echo(Echo& echo, msg::Assignment assignment, int count, Trips& trips) {
   std::vector<RolloutOutcome> answers;
   for (int i = 0; i < count; ++i) {
     const auto start = Clock::now();
-    auto answer_result = echo.ask(task);
+    auto answer_result = echo.ask(assignment);
     trips.add(start);
     if (!answer_result) return answer_result.error();
     auto outcome_result = wire::from_wire(*answer_result);
@@ -71,11 +71,11 @@ Result<Measurements> measure_round_trip(const Settings& settings) {
   if (auto loaded = swarm.pool().load(*scene_result); !loaded) return loaded.error();
   Echo echo(swarm.participant());
   if (auto ok = swarm.helpers().start("jostle_bench", {"echo"}); !ok) return ok.error();
-  if (auto ok = echo.meet(task_of(batch), swarm.helpers()); !ok) return ok.error();
+  if (auto ok = echo.meet(assignment_of(batch), swarm.helpers()); !ok) return ok.error();
 
   Trips pool_trips, bare_trips;
   auto result = compare({"pool over DDS", [&] { return through_pool(swarm.pool(), batch, kTrips, pool_trips); }},
-                        {"bare echo", [&] { return through_echo(echo, task_of(batch), kTrips, bare_trips); }},
+                        {"bare echo", [&] { return through_echo(echo, assignment_of(batch), kTrips, bare_trips); }},
                         swarm.turns(settings.repeats, settings.stop));
   if (!result) return result.error();
   result->name = "round-trip";
@@ -116,24 +116,24 @@ struct Domain {
     if (!keystore.empty()) arguments.insert(arguments.end(), {"--secure", keystore / "identities" / "robot"});
     Helpers& helpers = opened.swarm->helpers();
     if (auto ok = helpers.start("jostle_bench", arguments, {.hosts = &hosts, .host = 2}); !ok) return ok.error();
-    if (auto ok = opened.echo->meet(task_of(empty_batch(scene)), helpers); !ok) return ok.error();
+    if (auto ok = opened.echo->meet(assignment_of(empty_batch(scene)), helpers); !ok) return ok.error();
     return opened;
   }
 };
 
 // Controls of so many bytes; nobody executes them.
-msg::Task task_of_size(const physics_pool::Scene& scene, std::size_t bytes, bool both_ways) {
-  msg::Task task = task_of(empty_batch(scene));
-  task.batch().nominal().assign(bytes / sizeof(double), 0.5);
-  task.batch().want_all_trajectories(both_ways);
-  return task;
+msg::Assignment assignment_of_size(const physics_pool::Scene& scene, std::size_t bytes, bool both_ways) {
+  msg::Assignment assignment = assignment_of(empty_batch(scene));
+  assignment.batch().nominal().assign(bytes / sizeof(double), 0.5);
+  assignment.batch().want_all_trajectories(both_ways);
+  return assignment;
 }
 
-Result<Sample> there_and_back(Domain& domain, msg::Task task, int count) {
+Result<Sample> there_and_back(Domain& domain, msg::Assignment assignment, int count) {
   Hash hash;
   for (int i = 0; i < count; ++i) {
     const auto start = Clock::now();
-    auto answer_result = domain.echo->ask(task);
+    auto answer_result = domain.echo->ask(assignment);
     domain.trips.add(start);
     if (!answer_result) return answer_result.error();
     hash = hash_of(answer_result->trajectory());
@@ -142,11 +142,11 @@ Result<Sample> there_and_back(Domain& domain, msg::Task task, int count) {
 }
 
 // In megabytes per second, there.
-Result<Sample> flood(Domain& domain, msg::Task task, int count) {
+Result<Sample> flood(Domain& domain, msg::Assignment assignment, int count) {
   const auto start = Clock::now();
-  if (auto ok = domain.echo->stream(task, count, kWindow); !ok) return ok.error();
-  const double bytes = static_cast<double>(task.batch().nominal().size() * sizeof(double)) * count;
-  return Sample{.value = 1e-6 * bytes / seconds_since(start), .hash = hash_of(task.batch().nominal())};
+  if (auto ok = domain.echo->stream(assignment, count, kWindow); !ok) return ok.error();
+  const double bytes = static_cast<double>(assignment.batch().nominal().size() * sizeof(double)) * count;
+  return Sample{.value = 1e-6 * bytes / seconds_since(start), .hash = hash_of(assignment.batch().nominal())};
 }
 
 std::string size_name(std::size_t bytes) { return fmt::format("{}KiB", bytes / kKilo); }
@@ -172,16 +172,16 @@ class Link {
     if (auto ok = add("round-trip/pool", "us", *protected_result, *plain_result, pool); !ok) return ok.error();
     for (const std::size_t bytes : kPayloads) {
       if (!quality_.perfect() && bytes > kLargestOverBadLinks) continue;
-      const msg::Task task = task_of_size(*scene_result, bytes, true);
-      const auto ask = [&](Domain& domain) { return there_and_back(domain, task, trips(bytes)); };
+      const msg::Assignment assignment = assignment_of_size(*scene_result, bytes, true);
+      const auto ask = [&](Domain& domain) { return there_and_back(domain, assignment, trips(bytes)); };
       if (auto ok = add(fmt::format("round-trip/{}", size_name(bytes)), "us", *protected_result, *plain_result, ask);
           !ok)
         return ok.error();
     }
     for (const std::size_t bytes : kPayloads) {
       if (!quality_.perfect() && bytes > kKilo) continue;
-      const msg::Task task = task_of_size(*scene_result, bytes, false);
-      const auto send = [&](Domain& domain) { return flood(domain, task, messages(bytes)); };
+      const msg::Assignment assignment = assignment_of_size(*scene_result, bytes, false);
+      const auto send = [&](Domain& domain) { return flood(domain, assignment, messages(bytes)); };
       if (auto ok = add(fmt::format("throughput/{}", size_name(bytes)), "MB/s", *protected_result, *plain_result, send);
           !ok)
         return ok.error();

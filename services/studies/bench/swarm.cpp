@@ -76,7 +76,8 @@ Result<common::ChildProcess> Helpers::spawn(const std::string& program, const st
 std::string Helpers::casualty() {
   for (Helper& helper : helpers_) {
     common::ChildProcess& child = helper.process;
-    if (const auto end = child.ended()) return fmt::format("process {}: {}\n{}", child.pid(), *end, child.last_words());
+    if (const auto end = child.ended())
+      return fmt::format("process {}: {}\n{}", child.pid(), end->text(), child.last_words());
   }
   return "";
 }

@@ -106,6 +106,9 @@ std::vector<Cell> cells(const GraspingStudy& study, const std::vector<GraspingRu
   return result;
 }
 
+planners::Ending ending_of(const GraspingRun& run) {
+  return run.error.empty() ? run.outcome.ending : planners::Ending::kBroken;
+}
 double replans(const GraspingRun& run) { return run.outcome.replans; }
 double seconds(const GraspingRun& run) { return run.outcome.total_time.count(); }
 double plan_seconds(const GraspingRun& run) { return run.outcome.plan_time.count(); }
@@ -252,6 +255,7 @@ nlohmann::json study_json(const GraspingStudy& study, const std::vector<Grasping
                             {"level", run.level},
                             {"controller", run.controller},
                             {"success", outcome.success},
+                            {"ending", planners::to_string(ending_of(run))},
                             {"reason", run.error.empty() ? outcome.reason : run.error},
                             {"plan_hash", to_string(hash_of(outcome.first_plan.controls.values))},
                             {"plan_seconds", outcome.plan_time.count()},

@@ -71,6 +71,9 @@ std::vector<Cell> cells(const PushStudy& study, const std::vector<PushRun>& runs
   return result;
 }
 
+planners::Ending ending_of(const PushRun& run) {
+  return run.error.empty() ? run.outcome.ending : planners::Ending::kBroken;
+}
 double planning(const PushRun& run) { return run.outcome.planning_time.count(); }
 double actions(const PushRun& run) { return run.outcome.actions; }
 double per_plan(const PushRun& run) { return planning(run) / std::max(run.outcome.replans + 1, 1); }
@@ -127,6 +130,7 @@ StudyReport report(const PushStudy& study, const std::vector<PushRun>& runs) {
                                    {"predictor", study.entries[run.entry].predictor},
                                    {"threads", study.entries[run.entry].threads},
                                    {"success", run.outcome.success},
+                                   {"ending", planners::to_string(ending_of(run))},
                                    {"reason", run.error.empty() ? run.outcome.reason : run.error},
                                    {"actions", run.outcome.actions},
                                    {"rollouts", run.outcome.rollouts},

@@ -19,6 +19,8 @@ using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kFeedbackPeriod{100};
 constexpr std::size_t kGoalQueue = 8;
+constexpr std::chrono::seconds kAnswerPatience{2};  // for the middleware to take a result
+constexpr std::chrono::milliseconds kAnswerPause{50};
 
 const char* word(planners::Phase phase) {
   switch (phase) {
@@ -42,6 +44,18 @@ Rollouts rollouts_of(const physics_pool::PoolStatus& pool) {
   return rollouts;
 }
 
+std::uint8_t on_the_wire(planners::Ending ending) { return static_cast<std::uint8_t>(ending); }
+
+namespace endings = jostle_msgs::msg::GoalResult_Constants;
+using planners::Ending;
+static_assert(endings::UNKNOWN == static_cast<int>(Ending::kUnknown) &&
+              endings::SUCCEEDED == static_cast<int>(Ending::kSucceeded) &&
+              endings::FAILED == static_cast<int>(Ending::kFailed) &&
+              endings::TIMED_OUT == static_cast<int>(Ending::kTimedOut) &&
+              endings::CANCELLED == static_cast<int>(Ending::kCancelled) &&
+              endings::BROKEN == static_cast<int>(Ending::kBroken) &&
+              endings::REFUSED == static_cast<int>(Ending::kRefused));
+
 // What they did meanwhile; without those that did nothing.
 Rollouts since(const Rollouts& before, Rollouts now) {
   for (auto& [name, count] : now) {
@@ -52,10 +66,20 @@ Rollouts since(const Rollouts& before, Rollouts now) {
   return now;
 }
 
+// For what a bag of the run cannot do without. The task itself goes on: a robot does not stop because
+// a recording has a gap.
+template <class T>
+void tell(wire::Writer<T>& writer, const T& message, const std::string& what) {
+  if (!writer.write(message)) {
+    spdlog::warn("{} is lost: the middleware did not take it; a recording of this run cannot be replayed", what);
+  }
+}
+
 // What the asker puts into result.json and draws.
 std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::uint64_t seed, const Rollouts& used) {
   const planners::Plan& plan = outcome.first_plan;
   nlohmann::json report{{"success", outcome.success},
+                        {"ending", to_string(outcome.ending)},
                         {"reason", outcome.reason},
                         {"scene_hash", to_string(scene)},
                         {"seed", seed},
@@ -132,35 +156,55 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
     auto outcome_result =
         task_result ? perform(goal, *task_result, cancelled) : Result<planners::Outcome>(task_result.error());
     if (outcome_result) {
+      result.ending(on_the_wire(outcome_result->ending));
       result.success(outcome_result->success);
       result.reason(outcome_result->reason);
       result.report(report_of(*outcome_result, physics_pool::scene_hash(task_result->execution_scene()), goal.seed(),
                               since(before, rollouts_of(pool_.status()))));
     } else {
       const Error& error = outcome_result.error();
-      result.reason(error.code == Code::kCancelled ? "cancelled" : "the system failed");
+      const bool was_cancelled = error.code == Code::kCancelled;
+      result.ending(on_the_wire(was_cancelled ? planners::Ending::kCancelled : planners::Ending::kBroken));
+      result.reason(was_cancelled ? "cancelled" : "the system failed");
       result.error(error.message);
     }
   }
   spdlog::info("goal {}: {} {}", goal.goal_id(), result.reason(), result.error());
-  result_writer_.write(result);
+  answer(result, stop);
   const std::lock_guard lock(mutex_);
   goal_id_.clear();
   feedback_.goal_id("");
   feedback_.phase("idle");
 }
 
+// The asker waits for nothing else, so this is tried more than once.
+void Coordinator::answer(const jostle_msgs::msg::GoalResult& result, std::stop_token stop) {
+  const auto deadline = steady_clock::now() + kAnswerPatience;
+  while (!result_writer_.write(result)) {
+    if (steady_clock::now() < deadline && common::pause_until(steady_clock::now() + kAnswerPause, stop)) continue;
+    spdlog::error("goal {}: its result is lost: the middleware did not take it within {} s; it was: {} {}",
+                  result.goal_id(), kAnswerPatience.count(), result.reason(), result.error());
+    return;
+  }
+}
+
 Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task, std::stop_token stop) {
   const physics_pool::TaskGeometry& geometry = task.geometry();
   world::RobotClient robot(participant_);
   world::ObjectsClient objects(participant_, robot);
-  run_writer_.write(describe_run(goal));
+  const std::string goal_text = fmt::format("goal {}: ", goal.goal_id());
+  tell(run_writer_, describe_run(goal), goal_text + "its beginning");
   const Task::Watch watch{
       .on_event = [&](const planners::ControlEvent& event) { note(event, geometry); },
       .on_progress = [&](const planners::Progress& progress) { note(progress, geometry); },
       .journal = {.on_observation =
-                      [this](const jostle_msgs::msg::Observation& seen) { observation_writer_.write(seen); },
-                  .on_plan = [this](const jostle_msgs::msg::Plan& plan) { plan_writer_.write(plan); }},
+                      [&](const jostle_msgs::msg::Observation& seen) {
+                        tell(observation_writer_, seen, fmt::format("{}observation {}", goal_text, seen.number()));
+                      },
+                  .on_plan =
+                      [&](const jostle_msgs::msg::Plan& plan) {
+                        tell(plan_writer_, plan, fmt::format("{}plan {}", goal_text, plan.number()));
+                      }},
       .time = [&] { return robot.time(); }};
   return task.perform(robot, objects, watch, std::move(stop));
 }
@@ -171,12 +215,13 @@ void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
     if (!goal) continue;
     jostle_msgs::msg::GoalResult refusal;
     refusal.goal_id(goal->goal_id());
+    refusal.ending(on_the_wire(planners::Ending::kRefused));
     refusal.reason("refused");
     {
       const std::lock_guard lock(mutex_);
       refusal.error(fmt::format("coordinator: busy with goal {}; cancel it or wait", goal_id_));
     }
-    result_writer_.write(refusal);
+    answer(refusal, stop);
   }
 }
 
@@ -223,7 +268,7 @@ void Coordinator::publish_feedback(std::stop_token stop) {
       report.engine_steps(worker.engine_steps);
       feedback.workers().push_back(std::move(report));
     }
-    feedback_writer_.write(feedback);
+    (void)feedback_writer_.write(feedback);  // the next one comes in 100 ms
   } while (common::pause_until(steady_clock::now() + kFeedbackPeriod, stop));
 }
 

@@ -36,6 +36,7 @@ class Coordinator {
 
   Result<planners::Outcome> perform(const Goal& goal, Task& task, std::stop_token stop);
   void serve(const Goal& goal, std::stop_token stop);
+  void answer(const jostle_msgs::msg::GoalResult& result, std::stop_token stop);
   void refuse_goals_meanwhile(std::stop_token stop);
   void publish_feedback(std::stop_token stop);
   void note(const planners::ControlEvent& event, const physics_pool::TaskGeometry& geometry);

@@ -45,12 +45,12 @@ Result<void> draw(const RunOptions& options, const json& report) {
       common::program_folder() / "jostle_render",
       {frames_file, "-o", options.picture.string(), "--columns", "4", "--size", "480x360"}, log_file);
   if (!child_result) return child_result.error();
-  const std::string ended = child_result->wait();
+  const common::ExitStatus ended = child_result->wait();
   const std::string words = child_result->last_words();
   std::filesystem::remove(frames_file);
   std::filesystem::remove(log_file);
-  if (ended == "exit code 0") return {};
-  return Error{Code::kIo, fmt::format("{}: not drawn, {}\n{}", options.picture.string(), ended, words)};
+  if (ended.ok()) return {};
+  return Error{Code::kIo, fmt::format("{}: not drawn, {}\n{}", options.picture.string(), ended.text(), words)};
 }
 
 void print_summary(const json& report) {

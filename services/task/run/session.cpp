@@ -103,8 +103,8 @@ void Session::look_after_recorder() {
   if (!recorder_process_) return;
   const auto ended = recorder_process_->ended();
   if (!ended) return;
-  if (*ended != "exit code 0" && watcher_.on_notice) {
-    watcher_.on_notice(fmt::format("the recorder ended: {}\n{}", *ended, recorder_process_->last_words()));
+  if (!ended->ok() && watcher_.on_notice) {
+    watcher_.on_notice(fmt::format("the recorder ended: {}\n{}", ended->text(), recorder_process_->last_words()));
   }
   recorder_process_.reset();
 }
@@ -164,7 +164,7 @@ Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
       cancelled = Clock::now();
       jostle_msgs::msg::Cancel cancel;
       cancel.goal_id(goal_id_);
-      cancel_.write(cancel);
+      (void)cancel_.write(cancel);  // if it is lost, the coordinator is ended after kCancelPatience
     }
     if (cancelled && (!sent_ || Clock::now() - *cancelled > kCancelPatience)) {
       return Error{Code::kCancelled, "interrupted"};
@@ -224,9 +224,12 @@ Result<void> Session::send_goal() {
   goal.predictor(options_.predictor);
   goal.seed(options_.seed);
   goal.plan_only(options_.plan_only);
-  goal_.write(goal);
-  sent_ = true;
-  return {};
+  sent_ = goal_.write(goal);
+  if (sent_ || Clock::now() < goal_deadline_) return {};  // tried again at the next tick
+  return Error{Code::kUnavailable,
+               fmt::format("the goal could not be sent within {} s: the middleware did not take it; profiles that "
+                           "limit {} may be the reason",
+                           kStart.count(), wire::topics::kTaskGoal.name)};
 }
 
 Result<void> Session::look_after() {
@@ -248,12 +251,12 @@ Result<void> Session::look_after() {
     if (restarts_.size() > kMostRestarts) {
       return Error{Code::kUnavailable,
                    fmt::format("workers keep ending: {} within {} s, the last one: {}\n{}", restarts_.size(),
-                               kRestartWindow.count(), *ended, worker.last_words())};
+                               kRestartWindow.count(), ended->text(), worker.last_words())};
     }
     auto worker_result = start_worker(static_cast<std::size_t>(&worker - workers_.data()));
     if (!worker_result) return worker_result.error();
     if (watcher_.on_notice) {
-      watcher_.on_notice(fmt::format("worker {} ended ({}); started another", worker.pid(), *ended));
+      watcher_.on_notice(fmt::format("worker {} ended ({}); started another", worker.pid(), ended->text()));
     }
     worker = std::move(worker_result).value();
   }
@@ -263,7 +266,7 @@ Result<void> Session::look_after() {
 Result<void> Session::check_alive(const std::string& name, common::ChildProcess& child) const {
   const auto ended = child.ended();
   if (!ended) return {};
-  return Error{Code::kUnavailable, fmt::format("{} ended: {}\n{}", name, *ended, child.last_words())};
+  return Error{Code::kUnavailable, fmt::format("{} ended: {}\n{}", name, ended->text(), child.last_words())};
 }
 
 Result<void> Session::check_heard(const std::string& name, Clock::time_point heard) const {

@@ -5,7 +5,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <iterator>
 #include <optional>
+#include <utility>
 
 #include "physics_pool/robot/kinematics.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
@@ -37,8 +39,8 @@ struct Arguments {
 
 Result<void> write(const std::string& file, const std::string& text) {
   if (file == kStandardOutput) {
-    std::fwrite(text.data(), 1, text.size(), stdout);
-    return {};
+    if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0) return {};
+    return Error{Code::kIo, "standard output: cannot be written"};
   }
   return common::write_text(file, text);
 }
@@ -59,25 +61,26 @@ Result<Scene> make_scene(Arguments arguments) {
   return physics_pool::generate_chapter7(arguments.push);
 }
 
-Result<void> generate(const Arguments& arguments) {
+// The commands give the text that is to be written: all that goes wrong in them is bad input.
+
+Result<std::string> generate(const Arguments& arguments) {
   auto scene_result = make_scene(arguments);
   if (!scene_result) return scene_result.error();
-  return write(arguments.output, to_yaml(*scene_result, physics_pool::RobotText::kByName));
+  return to_yaml(*scene_result, physics_pool::RobotText::kByName);
 }
 
-Result<void> check(const Arguments& arguments) {
+Result<std::string> check(const Arguments& arguments) {
   const auto scene_result = physics_pool::load_scene(arguments.input);
   if (!scene_result) return scene_result.error();
-  fmt::print("ok {}\n", to_string(scene_hash(*scene_result)));
-  return {};
+  return fmt::format("ok {}\n", to_string(scene_hash(*scene_result)));
 }
 
-Result<void> perturb(const Arguments& arguments) {
+Result<std::string> perturb(const Arguments& arguments) {
   const auto level_result = physics_pool::parse_uncertainty(arguments.uncertainty);
   if (!level_result) return level_result.error();
   const auto scene_result = physics_pool::load_scene(arguments.input);
   if (!scene_result) return scene_result.error();
-  return write(arguments.output, to_yaml(physics_pool::perturb(*scene_result, *level_result, arguments.seed), physics_pool::RobotText::kByName));
+  return to_yaml(physics_pool::perturb(*scene_result, *level_result, arguments.seed), physics_pool::RobotText::kByName);
 }
 
 std::string size_text(const SceneObject& object) {
@@ -87,45 +90,49 @@ std::string size_text(const SceneObject& object) {
   return fmt::format("r {:.1f}, h {:.1f}", 1e3 * object.radius, 1e3 * object.height);
 }
 
-Result<void> show(const Arguments& arguments) {
+Result<std::string> show(const Arguments& arguments) {
   const auto scene_result = physics_pool::load_scene(arguments.input);
   if (!scene_result) return scene_result.error();
   const Scene& scene = *scene_result;
-  fmt::print("{}  {}\n", scene.name, to_string(scene_hash(scene)));
+  std::string text;
+  const auto print = [&text]<class... T>(fmt::format_string<T...> format, T&&... values) {
+    fmt::format_to(std::back_inserter(text), format, std::forward<T>(values)...);
+  };
+  print("{}  {}\n", scene.name, to_string(scene_hash(scene)));
   const physics_pool::Rectangle bounds = scene.surface.bounds();
   const Eigen::Vector3d tool =
       physics_pool::tool_pose(scene.robot.model, transform(scene.robot.base), scene.robot.q).translation();
-  fmt::print("surface {} x {} m{}, {} at x {:.3f}, y {:.3f}, z {:.3f} m, time step {} s, {} '{}'\n", bounds.size[0],
-             bounds.size[1], scene.surface.parts.size() > 1 ? fmt::format(" in {} parts", scene.surface.parts.size()) : "",
-             scene.robot.model.name, tool.x(), tool.y(), tool.z(), scene.physics.time_step, scene.task.kind,
-             scene.task.target);
+  print("surface {} x {} m{}, {} at x {:.3f}, y {:.3f}, z {:.3f} m, time step {} s, {} '{}'\n", bounds.size[0],
+        bounds.size[1], scene.surface.parts.size() > 1 ? fmt::format(" in {} parts", scene.surface.parts.size()) : "",
+        scene.robot.model.name, tool.x(), tool.y(), tool.z(), scene.physics.time_step, scene.task.kind,
+        scene.task.target);
   std::vector<std::string> axes;
   for (const physics_pool::Axis& axis : scene.robot.model.axes) axes.push_back(axis.name);
-  fmt::print("robot: {} joints, controls {}\n\n", scene.robot.model.joints.size(), fmt::join(axes, ", "));
-  const auto show_disc = [](const char* name, const physics_pool::Disc& disc) {
-    fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", name, "disc",
-               fmt::format("r {:.1f}", 1e3 * disc.radius), "", "", disc.x, disc.y);
+  print("robot: {} joints, controls {}\n\n", scene.robot.model.joints.size(), fmt::join(axes, ", "));
+  const auto show_disc = [&](const char* name, const physics_pool::Disc& disc) {
+    print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", name, "disc", fmt::format("r {:.1f}", 1e3 * disc.radius),
+          "", "", disc.x, disc.y);
   };
-  fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8} {:>8} {:>8}\n", "name", "shape", "size mm", "mass kg", "friction",
-             "x m", "y m", "yaw rad");
+  print("{:16} {:9} {:20} {:>8} {:>9} {:>8} {:>8} {:>8}\n", "name", "shape", "size mm", "mass kg", "friction", "x m",
+        "y m", "yaw rad");
   for (const SceneObject& object : scene.objects) {
-    fmt::print("{:16} {:9} {:20} {:>8.3f} {:>9.3f} {:>8.3f} {:>8.3f} {:>8.3f}\n", object.name,
-               object.shape == physics_pool::Shape::kBox ? "box" : "cylinder", size_text(object), object.mass,
-               object.friction, object.x, object.y, object.yaw);
+    print("{:16} {:9} {:20} {:>8.3f} {:>9.3f} {:>8.3f} {:>8.3f} {:>8.3f}\n", object.name,
+          object.shape == physics_pool::Shape::kBox ? "box" : "cylinder", size_text(object), object.mass,
+          object.friction, object.x, object.y, object.yaw);
   }
   for (const physics_pool::Fixture& fixture : scene.fixtures) {
     const bool box = fixture.shape == physics_pool::Shape::kBox;
-    fmt::print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", fixture.name, box ? "box" : "cylinder",
+    print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", fixture.name, box ? "box" : "cylinder",
                box ? fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * fixture.size[0], 1e3 * fixture.size[1], 1e3 * fixture.size[2])
                    : fmt::format("r {:.1f}, h {:.1f}", 1e3 * fixture.radius, 1e3 * fixture.height),
                "fixed", "", fixture.pose.position[0], fixture.pose.position[1]);
   }
   if (physics_pool::find_task_kind(scene.task.kind)->has_goal) show_disc("(goal)", scene.task.goal);
   if (scene.task.obstacle) show_disc("(obstacle)", *scene.task.obstacle);
-  return {};
+  return text;
 }
 
-using Command = Result<void> (*)(const Arguments&);
+using Command = Result<std::string> (*)(const Arguments&);
 
 void add_input(CLI::App& command, Arguments& arguments) {
   command.add_option("file", arguments.input, "a scene file")->required();
@@ -192,9 +199,14 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   add_commands(app, arguments, chosen);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
-  if (auto ok = chosen(arguments); !ok) {
+  const auto text_result = chosen(arguments);
+  if (!text_result) {
+    fmt::print(stderr, "jostle scene: {}\n", text_result.error().message);
+    return common::kExitUsage;
+  }
+  if (auto ok = write(arguments.output, *text_result); !ok) {
     fmt::print(stderr, "jostle scene: {}\n", ok.error().message);
     return common::kExitFailed;
   }
-  return 0;
+  return common::kExitOk;
 }

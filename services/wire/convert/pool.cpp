@@ -36,7 +36,7 @@ Error wrong(const char* field, const std::string& got, const std::string& wanted
   return {Code::kInvalidArgument, fmt::format("result.{}: got {}, wanted {}", field, got, wanted)};
 }
 
-Result<Trajectory> trajectory_from_wire(const msg::TaskResult& wire) {
+Result<Trajectory> trajectory_from_wire(const msg::AssignmentResult& wire) {
   const std::size_t nq = wire.nq(), nv = wire.nv(), size = wire.trajectory().size();
   if (size == 0) return Trajectory{};
   if (nq + nv == 0 || size % (nq + nv) != 0) {
@@ -124,8 +124,8 @@ RolloutBatch from_wire(const msg::BatchDescription& wire) {
   return batch;
 }
 
-msg::TaskResult to_wire(const RolloutOutcome& outcome) {
-  msg::TaskResult wire;
+msg::AssignmentResult to_wire(const RolloutOutcome& outcome) {
+  msg::AssignmentResult wire;
   wire.sample(outcome.sample);
   wire.end(static_cast<std::uint8_t>(outcome.end));
   wire.cost(outcome.cost);
@@ -148,7 +148,7 @@ msg::TaskResult to_wire(const RolloutOutcome& outcome) {
   return wire;
 }
 
-Result<RolloutOutcome> from_wire(const msg::TaskResult& wire) {
+Result<RolloutOutcome> from_wire(const msg::AssignmentResult& wire) {
   if (!wire.error().empty()) {
     const bool known = wire.error_code() <= static_cast<std::uint8_t>(Code::kInternal);
     return Error{known ? static_cast<Code>(wire.error_code()) : Code::kInternal, wire.error()};

@@ -18,10 +18,10 @@ jostle_msgs::msg::BatchDescription to_wire(const physics_pool::RolloutBatch& bat
 physics_pool::RolloutBatch from_wire(const jostle_msgs::msg::BatchDescription& wire);
 
 /// The outcome only; who asked and who answers is the sender's to fill in.
-jostle_msgs::msg::TaskResult to_wire(const physics_pool::RolloutOutcome& outcome);
+jostle_msgs::msg::AssignmentResult to_wire(const physics_pool::RolloutOutcome& outcome);
 
-/// Errors   the worker's own, if it refused the task
+/// Errors   the worker's own, if it refused the assignment
 ///          kInvalidArgument  `end`, `cost`, `step_costs` or `trajectory` make no sense
-Result<physics_pool::RolloutOutcome> from_wire(const jostle_msgs::msg::TaskResult& wire);
+Result<physics_pool::RolloutOutcome> from_wire(const jostle_msgs::msg::AssignmentResult& wire);
 
 }  // namespace jostle::wire

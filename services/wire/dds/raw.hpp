@@ -32,7 +32,7 @@ class RawWriter : public WriterBase {
   RawWriter(const Participant& participant, const RawTopic& topic);
 
   /// As Writer::write; false also for less than the encapsulation.
-  bool write(std::span<const std::byte> sample);
+  [[nodiscard]] bool write(std::span<const std::byte> sample);
 };
 
 /// Calls back as Reader does; the bytes are gone when the callback returns.

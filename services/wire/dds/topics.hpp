@@ -33,7 +33,7 @@ inline const Topic<msg::GoalResult> kTaskResult{"rt/task/result", kAnswer};
 inline const Topic<msg::WorkerHeartbeat> kPoolWorker{"rt/pool/worker", kState, Scope::kDomain};
 inline const Topic<msg::WorldDescription> kPoolWorld{"rt/pool/world", kCatalogue, Scope::kDomain};
 inline const Topic<msg::BatchControl> kPoolControl{"rt/pool/control", kTask, Scope::kDomain};
-inline const Topic<msg::TaskResult> kPoolResult{"rt/pool/result", kTask, Scope::kDomain};
+inline const Topic<msg::AssignmentResult> kPoolResult{"rt/pool/result", kTask, Scope::kDomain};
 
 /// Of bags that are played; the clock shows the bag's time.
 inline const Topic<msg::PlayControl> kPlayControl{"rt/play/control", kCommand};
@@ -47,10 +47,10 @@ inline auto all() {
                   kPoolWorld, kPoolControl, kPoolResult, kPlayControl, kPlayStatus, kClock);
 }
 
-/// Each worker reads its own: one sample per task on a shared topic would reach
+/// Each worker reads its own: one sample per assignment on a shared topic would reach
 /// all of them (32 workers: 22.5 ms against 2.7 ms).
-inline Topic<msg::Task> pool_task(std::uint64_t worker) {
-  return {fmt::format("rt/pool/task/w{:016x}", worker), kTask, Scope::kDomain};
+inline Topic<msg::Assignment> pool_assignment(std::uint64_t worker) {
+  return {fmt::format("rt/pool/assignment/w{:016x}", worker), kTask, Scope::kDomain};
 }
 
 }  // namespace jostle::wire::topics

@@ -48,7 +48,7 @@ class WriterBase {
   void forget();
 
  protected:
-  bool write_sample(const void* data);
+  [[nodiscard]] bool write_sample(const void* data);
 
  private:
   struct Impl;
@@ -63,9 +63,10 @@ class Writer : public WriterBase {
                    eprosima::fastdds::dds::TypeSupport(new Serializer<T>())) {}
 
   /// Sends from the calling thread, tens of microseconds for small messages.
-  /// Without readers it succeeds. False when the middleware had no room: more
-  /// keys than the topic's Qos allows.
-  bool write(const T& message) { return write_sample(&message); }
+  /// Without readers it succeeds. False: the message is lost, because the middleware had no
+  /// room (more keys than the topic's Qos allows, or a profile that keeps all for a reader
+  /// that does not keep up). Who can do without it says so with (void), and why.
+  [[nodiscard]] bool write(const T& message) { return write_sample(&message); }
 };
 
 }  // namespace jostle::wire

@@ -12,7 +12,7 @@ namespace jostle::wire {
 
 enum class Role {
   kRobot,     ///< everything: coordinator, simulated world, run, bridge
-  kWorker,    ///< the pool's topics: hears tasks, says results; no robot and no goal
+  kWorker,    ///< the pool's topics: hears assignments, says results; no robot and no goal
   kObserver,  ///< hears everything, says nothing: recorders
   kServer,    ///< joins, no topic at all. Meant for discovery servers, which Fast DDS 2.9.1 cannot protect
 };

@@ -30,7 +30,7 @@ Result<robot_bridge::RobotReading> SimulatedRobot::read() {
   return robot_bridge::RobotReading{
       .q = {x.q.begin(), x.q.begin() + joints},
       .v = {x.v.begin(), x.v.begin() + joints},
-      .object_in_hand = geometry.robot.hand ? std::optional(physics_pool::at_goal(geometry, x, {})) : std::nullopt};
+      .object_in_hand = physics_pool::object_in_hand(geometry, x)};
 }
 
 Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {

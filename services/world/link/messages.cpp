@@ -102,8 +102,7 @@ Result<void> check_finite(const std::vector<double>& q, const std::vector<double
   return {};
 }
 
-// Observation.in_hand
-enum InHand : std::uint8_t { kNothing, kObject, kCannotTell };
+namespace hand = jostle_msgs::msg::RobotStatus_Constants;
 
 }  // namespace
 
@@ -171,20 +170,21 @@ bool is_stop(const jostle_msgs::msg::VelocityCommand& command) {
   return command.velocities().empty() && command.duration() == 0;
 }
 
-Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message) {
-  if (auto ok = check_finite(message.q(), message.v()); !ok) return ok.error();
-  return robot_bridge::RobotReading{.q = message.q(), .v = message.v(), .object_in_hand = message.object_in_hand()};
+std::uint8_t in_hand_message(std::optional<bool> object_in_hand) {
+  if (!object_in_hand) return hand::CANNOT_TELL;
+  return *object_in_hand ? hand::HOLDING : hand::EMPTY;
 }
 
-std::optional<int> axes_of(std::size_t joints) {
-  switch (joints) {
-    case kPusherJoints:
-      return kPusherAxes;
-    case kGripperJoints:
-      return kGripperAxes;
-    default:
-      return {};
-  }
+std::optional<bool> in_hand_from(std::uint8_t in_hand) {
+  if (in_hand == hand::HOLDING) return true;
+  if (in_hand == hand::EMPTY) return false;
+  return {};
+}
+
+Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message) {
+  if (auto ok = check_finite(message.q(), message.v()); !ok) return ok.error();
+  return robot_bridge::RobotReading{
+      .q = message.q(), .v = message.v(), .object_in_hand = in_hand_from(message.in_hand())};
 }
 
 jostle_msgs::msg::Observation to_message(const Seen& seen, double time) {
@@ -192,7 +192,7 @@ jostle_msgs::msg::Observation to_message(const Seen& seen, double time) {
   message.header(make_header(time));
   message.q(seen.robot.q);
   message.v(seen.robot.v);
-  message.in_hand(!seen.robot.object_in_hand ? kCannotTell : *seen.robot.object_in_hand ? kObject : kNothing);
+  message.in_hand(in_hand_message(seen.robot.object_in_hand));
   message.objects(to_messages(seen.objects));
   return message;
 }
@@ -201,9 +201,8 @@ Result<Seen> from_message(const jostle_msgs::msg::Observation& message) {
   if (auto ok = check_finite(message.q(), message.v()); !ok) return ok.error();
   auto objects_result = from_messages(message.objects());
   if (!objects_result) return objects_result.error();
-  Seen seen{.robot = {.q = message.q(), .v = message.v()}, .objects = std::move(objects_result).value()};
-  if (message.in_hand() != kCannotTell) seen.robot.object_in_hand = message.in_hand() == kObject;
-  return seen;
+  return Seen{.robot = {.q = message.q(), .v = message.v(), .object_in_hand = in_hand_from(message.in_hand())},
+              .objects = std::move(objects_result).value()};
 }
 
 }  // namespace jostle::world

@@ -36,11 +36,13 @@ tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates&
 jostle_msgs::msg::VelocityCommand stop_message(std::uint64_t epoch, std::uint64_t sequence_number);
 bool is_stop(const jostle_msgs::msg::VelocityCommand& command);
 
+/// `in_hand` of a status or an observation, one of RobotStatus_Constants. A number that is none of
+/// them says nothing about the hand.
+std::uint8_t in_hand_message(std::optional<bool> object_in_hand);
+std::optional<bool> in_hand_from(std::uint8_t in_hand);
+
 /// Error kInvalidArgument naming the field.
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message);
-
-/// Control axes of a robot that reads so many joints; nothing for neither gripper nor pusher.
-std::optional<int> axes_of(std::size_t joints);
 
 /// What a controller sees at a time.
 struct Seen {

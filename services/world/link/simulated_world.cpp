@@ -26,6 +26,7 @@ SimulatedWorld::SimulatedWorld(const wire::Participant& participant, physics_poo
     : options_(options),
       world_(world, physics_pool::velocity_noise(options.level), options.seed),
       belief_(physics_pool::perturb(world->scene(), options.level, options.seed)),
+      limits_(physics_pool::axis_limits(world->scene().robot.model)),
       still_(static_cast<std::size_t>(world->geometry().layout.nu), 0.0),
       joints_(participant, wire::topics::kJointStates),
       objects_(participant, wire::topics::kObjectStates),
@@ -81,7 +82,7 @@ void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
     return;
   }
   const auto check_result =
-      robot_bridge::check_command(command.velocities(), physics_pool::axis_limits(world_.world().scene().robot.model), command.duration());
+      robot_bridge::check_command(command.velocities(), limits_, command.duration());
   if (!check_result && command.epoch() > epoch_) {  // the present commander must not suffer for it
     spdlog::warn("command {}/{} of a newcomer: {}; refused", command.epoch(), command.sequence_number(),
                  check_result.error().message);
@@ -154,22 +155,24 @@ void SimulatedWorld::publish() {
       physics_pool::observed_state(world_.world().scene(), belief_, truth,
                                    moved_ ? physics_pool::Measurement::kFeedback : physics_pool::Measurement::kInitial);
   const auto objects = to_message(object_readings(geometry.layout, seen), time);
-  objects_.write(objects);
-  poses_.write(pose_array_message(objects));
-  transforms_.write(transform_message(objects));
+  // States: when one is lost, the next one follows within kPublicationPeriod and says as much.
+  (void)objects_.write(objects);
+  (void)poses_.write(pose_array_message(objects));
+  (void)transforms_.write(transform_message(objects));
   const auto joints = joint_state_message(geometry.layout, truth, time);
-  joints_.write(joints);
+  (void)joints_.write(joints);
 
   jostle_msgs::msg::RobotStatus status;
   status.header(make_header(time));
   status.epoch(epoch_);
   status.sequence_number(finished_);
   status.busy(busy_ || !actions_.empty());
-  status.object_in_hand(geometry.robot.hand && physics_pool::at_goal(geometry, truth, {}));
+  status.in_hand(in_hand_message(physics_pool::object_in_hand(geometry, truth)));
   status.error(error_);
   status.q(joints.position());
   status.v(joints.velocity());
-  status_.write(status);  // last: who sees a command finished finds its objects sent
+  status.limits(limits_);
+  (void)status_.write(status);  // last: who sees a command finished finds its objects sent
 }
 
 }  // namespace jostle::world

@@ -62,6 +62,7 @@ class SimulatedWorld {
   SimulatedWorldOptions options_;
   physics_pool::ExecutionWorld world_;
   physics_pool::Scene belief_;
+  std::vector<double> limits_;                             // of the axes, m/s or rad/s
   std::vector<double> still_;                              // the control that moves nothing
   std::deque<jostle_msgs::msg::VelocityCommand> waiting_;  // came while an action was at work
   std::deque<Action> actions_;

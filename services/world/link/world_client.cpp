@@ -61,7 +61,7 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::stop_token s
     }
     known_ = known_ || status->epoch() == epoch_;
     heard_ = true;
-    joints_ = status->q().size();
+    limits_ = status->limits();
     time_ = seconds(status->header());
     return *std::move(status);
   }
@@ -127,8 +127,7 @@ Result<void> RobotClient::execute(std::span<const double> u, double duration, st
   if (auto ok = robot_bridge::check_command(u, std::vector<double>(u.size(), robot_bridge::kAnySpeed), duration); !ok) return ok;
   if (auto ok = wait_for_robot(stop); !ok) return ok;
   // Here already: a robot says nothing of a newcomer's bad command.
-  const int axes = axes_of(joints_).value_or(static_cast<int>(u.size()));
-  if (auto ok = robot_bridge::check_command(u, axes, duration); !ok) return ok;
+  if (auto ok = robot_bridge::check_command(u, limits_, duration); !ok) return ok;
   if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped before it moved"};
   jostle_msgs::msg::VelocityCommand command;
   command.header(make_header(time_));

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "perception/api/object_source.hpp"
 #include "robot_bridge/api/robot.hpp"
@@ -58,7 +59,7 @@ class RobotClient final : public robot_bridge::Robot {
   std::uint64_t sequence_number_ = 0;
   std::string refusal_;  // the last one heard; it is repeated until the next good command
   bool heard_ = false;
-  std::size_t joints_ = 0;  // of the newest status
+  std::vector<double> limits_;  // per axis, of the newest status
   bool known_ = false;      // a status has named our epoch
   double time_ = 0.0;
   std::uint64_t rejected_ = 0;

@@ -66,6 +66,7 @@ class EitherController : public ControllerTest, public testing::WithParamInterfa
 TEST_P(EitherController, GraspsAlongTheStraightLineWhenTheWorldIsAsPredicted) {
   const Outcome result = outcome();
   EXPECT_TRUE(result.success);
+  EXPECT_EQ(result.ending, Ending::kSucceeded);
   EXPECT_EQ(result.reason, "target grasped");
   EXPECT_THAT(result.dropped, testing::IsEmpty());
   // It stops as soon as the target is in the hand (OR) or the plan is over (NR).
@@ -97,6 +98,7 @@ TEST_P(EitherController, EndsWithTheNameOfWhatWasDropped) {
   };
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_THAT(result.reason, HasSubstr("dropped can"));
   EXPECT_THAT(result.dropped, testing::ElementsAre("can"));
   if (GetParam() == Method::kOnline) {
@@ -116,6 +118,7 @@ TEST_P(EitherController, ReportsATimeoutOfThePlannerAsAnOutcome) {
   planner.error = Error{Code::kDeadline, "too late"};
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kTimedOut);
   EXPECT_THAT(result.reason, HasSubstr("timeout"));
   EXPECT_THAT(robot.executed, testing::IsEmpty());
 }
@@ -124,6 +127,7 @@ TEST_P(EitherController, ReportsATimeoutBeforeAnActionAsAnOutcome) {
   options.timeout = std::chrono::milliseconds(0);
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kTimedOut);
   EXPECT_THAT(result.reason, HasSubstr("timeout"));
   EXPECT_THAT(robot.executed, testing::IsEmpty());
 }
@@ -176,6 +180,7 @@ TEST_P(EitherController, ExecutesNothingWhenOnlyPlanning) {
     planner.predicts_goal = grasps;
     const Outcome result = outcome();
     EXPECT_EQ(result.success, grasps);
+    EXPECT_EQ(result.ending, grasps ? Ending::kSucceeded : Ending::kFailed);
     EXPECT_THAT(result.reason, HasSubstr("not executed"));
     EXPECT_EQ(planner.problems.size(), 1u);
     EXPECT_EQ(result.first_plan.controls.steps(), options.initial_steps);

@@ -57,7 +57,7 @@ class MpcTest : public testing::Test {
   const physics_pool::Scene scene = tests::push_around();  // target, other; goal at (0.2, 0)
   const physics_pool::TaskGeometry geometry{scene};
   State x = initial_state(scene);
-  tests::KinematicRobot robot{x, 2};
+  tests::KinematicRobot robot{x, 2, kPusherControls};
   tests::KinematicObjects objects{geometry.layout, x};
   tests::KinematicPlanner planner;
   ControlSetup setup{.planner = planner,
@@ -168,6 +168,7 @@ TEST_F(MpcTest, EndsWhenTheTargetIsInTheGoalRegion) {
   put_after(3, 0, 0.21, 0.02);
   const Outcome result = outcome();
   EXPECT_TRUE(result.success);
+  EXPECT_EQ(result.ending, Ending::kSucceeded);
   EXPECT_EQ(result.reason, "target in the goal region");
   EXPECT_EQ(result.actions, 3);
 }
@@ -182,6 +183,7 @@ TEST_F(MpcTest, EndsWhenTheTargetHitsTheObstacle) {
   put_after(2, 0, -0.09, 0.0);
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "target hit the obstacle");
   EXPECT_EQ(result.actions, 2);
 }
@@ -190,6 +192,7 @@ TEST_F(MpcTest, EndsWhenThePusherHitsTheObstacle) {
   robot.after_execute = [](State& state, int) { state.q[kJointX] = 0.05; };
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "pusher hit the obstacle");
   EXPECT_EQ(result.actions, 1);
 }
@@ -198,6 +201,7 @@ TEST_F(MpcTest, EndsWithTheNameOfWhatWasDropped) {
   put_after(2, 1, 0.0, 0.25, -0.5);
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "dropped other");
   EXPECT_THAT(result.dropped, testing::ElementsAre("other"));
 }
@@ -206,12 +210,14 @@ TEST_F(MpcTest, EndsWithTheNameOfWhatIsInTheGoalRegion) {
   put_after(2, 1, 0.2, 0.03);
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "other in the goal region");
 }
 
 TEST_F(MpcTest, GivesUpAfterTheLastAction) {
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "not in the goal region after 6 actions");
   EXPECT_EQ(planner.problems.size(), 6u);
 }
@@ -225,21 +231,24 @@ TEST_F(MpcTest, MovesNothingWhenOnlyAPlanIsWanted) {
   options.plan_only = true;
   Outcome result = outcome();
   EXPECT_TRUE(result.success);
+  EXPECT_EQ(result.ending, Ending::kSucceeded);
   EXPECT_EQ(result.reason, "plan reaches the goal region; not executed");
   EXPECT_EQ(result.first_plan.controls, planner.problems[0].initial);
   EXPECT_THAT(robot.executed, testing::IsEmpty());
   planner.predicts_goal = false;
   result = outcome();
   EXPECT_FALSE(result.success);
+  EXPECT_EQ(result.ending, Ending::kFailed);
   EXPECT_EQ(result.reason, "plan does not reach the goal region; not executed");
 }
 
 TEST_F(MpcTest, ReportsATimeoutAsAnOutcome) {
   planner.error = Error{Code::kDeadline, "too late"};
+  EXPECT_EQ(outcome().ending, Ending::kTimedOut);
   EXPECT_THAT(outcome().reason, HasSubstr("timeout"));
   planner.error.reset();
   options.timeout = std::chrono::milliseconds(0);
-  EXPECT_THAT(outcome().reason, HasSubstr("timeout"));
+  EXPECT_EQ(outcome().ending, Ending::kTimedOut);
   EXPECT_THAT(robot.executed, testing::IsEmpty());
 }
 

@@ -16,6 +16,7 @@ using bags::Decoder;
 using bags::definition_of;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 // CDR by hand: values aligned to their size behind the four bytes.
@@ -81,7 +82,7 @@ TEST(DefinitionOf, IsThereForEveryMessageOfIdlAndDecodable) {
   const auto types = bags::known_types();
   ASSERT_GT(types.size(), 50u);
   for (const char* type :
-       {"jostle_msgs/msg/Plan", "jostle_msgs/msg/Task", "jostle_msgs/msg/GoalResult", "tf2_msgs/msg/TFMessage",
+       {"jostle_msgs/msg/Plan", "jostle_msgs/msg/Assignment", "jostle_msgs/msg/GoalResult", "tf2_msgs/msg/TFMessage",
         "sensor_msgs/msg/PointCloud2", "visualization_msgs/msg/MarkerArray", "nav_msgs/msg/Odometry",
         "rcl_interfaces/msg/Log", "diagnostic_msgs/msg/DiagnosticArray", "trajectory_msgs/msg/JointTrajectory"}) {
     EXPECT_THAT(types, Contains(type));
@@ -97,6 +98,44 @@ TEST(DefinitionsOfIdl, SayWhatIsMalformedAndWhere) {
   EXPECT_THAT(error("struct S {};"), HasSubstr("line 1: got 'struct', wanted 'module'"));
   EXPECT_THAT(error("module a { module msg { struct S { T t; }; }; };"), HasSubstr("t: got type a/T"));
   EXPECT_THAT(error("module a { module msg { struct S { double x"), HasSubstr("wanted ';'"));
+}
+
+TEST(DefinitionsOfIdl, ConstantsOfAMessageStandInFrontOfItsFields) {
+  const auto result = bags::definitions_of_idl(
+      {{"a.idl",
+        "module a { module msg {\n"
+        "module S_Constants {\n const octet OK = 1;  // all is well\n const unsigned long BIG = 70000;\n};\n"
+        "// Says how.\nstruct S { octet how; };\nstruct T { double x; };\n}; };"}});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->at("a/msg/S"), "# Says how.\nuint8 OK=1  # all is well\nuint32 BIG=70000\nuint8 how\n");
+  EXPECT_EQ(result->at("a/msg/T"), "float64 x\n");
+  const auto sut = taken(Decoder::create("a/msg/S", result->at("a/msg/S")));
+  EXPECT_EQ(taken(sut.decode(Cdr().add(std::uint8_t{1}).bytes())).dump(), R"({"how":1})");
+
+  const auto error = [](std::string_view text) {
+    return bags::definitions_of_idl({{"a.idl", "module a { module msg { " + std::string(text) + " }; };"}})
+        .error()
+        .message;
+  };
+  EXPECT_THAT(error("module Values { const octet A = 1; };"), HasSubstr("got 'Values', wanted"));
+  EXPECT_THAT(error("module S_Constants { const Other A = 1; }; struct S { octet a; };"), HasSubstr("basic type"));
+  EXPECT_THAT(error("module S_Constants { const octet A = 1; }; struct T { octet a; };"), HasSubstr("wanted struct S"));
+}
+
+TEST(DefinitionOf, ResultsSaysWhatItsNumbersMean) {
+  EXPECT_THAT(definition_of("jostle_msgs/msg/GoalResult").value(), HasSubstr("uint8 TIMED_OUT=3\n"));
+}
+
+TEST(EarlierDefinitionOf, DecodesWhatWasRecordedBeforeAFieldWasAppended) {
+  const std::string type = "jostle_msgs/msg/GoalResult";
+  const auto earlier = taken(Decoder::create(type, bags::earlier_definition_of(type).value()));
+  const Bytes old = Cdr().text("goal").add(std::uint8_t{1}).text("target grasped").text("").text("{}").bytes();
+  EXPECT_FALSE(decoder(type).decode(old));
+  EXPECT_EQ(taken(earlier.decode(old)).dump(),
+            R"({"goal_id":"goal","success":true,"reason":"target grasped","error":"","report":"{}"})");
+  EXPECT_THAT(bags::earlier_definition_of("jostle_msgs/msg/WorkerHeartbeat").value(),
+              AllOf(HasSubstr("ClientLoad[] clients"), Not(HasSubstr("refused"))));
+  EXPECT_FALSE(bags::earlier_definition_of("jostle_msgs/msg/Plan"));
 }
 
 TEST(DecoderTest, DecodesEveryKindOfFieldInBothByteOrders) {
@@ -151,7 +190,7 @@ TEST(DecoderTest, RefusesOtherBytesThanTheTypeHas) {
 }
 
 TEST(DecoderTest, NeverCrashesOnChangedBytes) {
-  const auto sut = decoder("jostle_msgs/msg/Task");
+  const auto sut = decoder("jostle_msgs/msg/Assignment");
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
     Bytes bytes = noise(seed % 600 + 4, seed);
     bytes[0] = std::byte{0};

@@ -19,7 +19,7 @@ using bags::SequenceSet;
 TEST(Selection, WithoutGlobsTakesAllButWhatIsExcluded) {
   const Selection sut{.excluded = {"/pool/*"}};
   EXPECT_TRUE(sut.wants("/robot/status"));
-  EXPECT_FALSE(sut.wants("/pool/task/w1"));
+  EXPECT_FALSE(sut.wants("/pool/assignment/w1"));
   EXPECT_TRUE(sut.wants("/pool"));
 }
 

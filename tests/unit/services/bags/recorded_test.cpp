@@ -37,8 +37,11 @@ class Recorded : public testing::Test {
 
   template <class T>
   void write(const std::string& topic, const std::string& type, Time time, const T& message) {
+    write_bytes(topic, type, time, wire::to_cdr(message));
+  }
+
+  void write_bytes(const std::string& topic, const std::string& type, Time time, const std::vector<std::byte>& bytes) {
     if (!topics.contains(topic)) topics[topic] = writer->add_topic({.name = topic, .type = type}).value();
-    const auto bytes = wire::to_cdr(message);
     ASSERT_TRUE(writer->write(topics[topic], {.log_time = time, .publish_time = time, .data = bytes}));
   }
 
@@ -78,6 +81,7 @@ class Recorded : public testing::Test {
     jostle_msgs::msg::GoalResult result;
     result.goal_id(goal);
     result.reason(reason);
+    result.ending(static_cast<std::uint8_t>(planners::Ending::kFailed));
     write("/task/result", "jostle_msgs/msg/GoalResult", time, result);
   }
 
@@ -113,6 +117,87 @@ TEST_F(Recorded, RunsComeInTheOrderTheyWereTakenUp) {
   EXPECT_FALSE(second.concluded());
   EXPECT_EQ(select_runs(*runs_result, "a-name")->size(), 1u);
   EXPECT_THAT(select_runs(*runs_result, "b-name").error().message, HasSubstr("second-name, a-name"));
+}
+
+// A GoalResult as it was before it had `ending`: CDR by hand, little endian.
+std::vector<std::byte> old_result(const std::string& goal, bool success, const std::string& reason,
+                                  const std::string& error = "") {
+  std::vector<std::byte> bytes{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
+  const auto text = [&](const std::string& value) {
+    while (bytes.size() % 4 != 0) bytes.push_back({});
+    const std::size_t size = value.size() + 1;
+    for (int shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<std::byte>(size >> shift));
+    for (const char c : value) bytes.push_back(static_cast<std::byte>(c));
+    bytes.push_back({});
+  };
+  text(goal);
+  bytes.push_back(static_cast<std::byte>(success));
+  text(reason);
+  text(error);
+  text("{}");
+  return bytes;
+}
+
+TEST(ResultFromCdr, ReadsTheLayoutOfBeforeThereWereEndings) {
+  using planners::Ending;
+  const struct {
+    bool success;
+    const char *reason, *error;
+    Ending ending;
+  } cases[] = {{true, "target grasped", "", Ending::kSucceeded},
+               {false, "dropped can", "", Ending::kFailed},
+               {false, "timeout after 60 s", "", Ending::kTimedOut},
+               {false, "cancelled", "robot: stopped in mid-action", Ending::kCancelled},
+               {false, "refused", "coordinator: busy with goal g", Ending::kRefused},
+               {false, "the system failed", "no worker heard for 10 s", Ending::kBroken}};
+  for (const auto& [success, reason, error, ending] : cases) {
+    SCOPED_TRACE(reason);
+    std::vector<std::byte> bytes = old_result("a goal", success, reason, error);
+    for (int padding = 0; padding < 4; ++padding) {  // RTPS fills up to four bytes, and recorders keep it
+      const auto result = result_from_cdr(bytes);
+      ASSERT_TRUE(result) << result.error().message;
+      EXPECT_EQ(result->goal_id(), "a goal");
+      EXPECT_EQ(result->success(), success);
+      EXPECT_EQ(result->reason(), reason);
+      EXPECT_EQ(result->error(), error);
+      EXPECT_EQ(result->report(), "{}");
+      EXPECT_EQ(result->ending(), 0);
+      EXPECT_EQ(ending_of(*result), ending);
+      bytes.push_back({});
+    }
+  }
+}
+
+TEST(ResultFromCdr, RefusesBytesThatAreCutOff) {
+  const std::vector<std::byte> whole = old_result("a goal", true, "target grasped");
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    EXPECT_FALSE(result_from_cdr(std::span(whole).first(size))) << size;
+  }
+}
+
+TEST(EndingOf, BelievesTheFieldRatherThanTheSentence) {
+  jostle_msgs::msg::GoalResult result;
+  result.reason("timeout, says a sentence that nobody reads");
+  for (std::uint8_t ending = 1; ending <= 6; ++ending) {
+    result.ending(ending);
+    EXPECT_EQ(static_cast<std::uint8_t>(ending_of(result)), ending);
+  }
+  result.ending(77);  // of a later version: the sentence again
+  EXPECT_EQ(ending_of(result), planners::Ending::kTimedOut);
+}
+
+TEST_F(Recorded, RunsOfBeforeThereWereEndingsAreRead) {
+  begin("g", kSecond), observe("g", 0, 2 * kSecond, 0, seen_at(0)), plan("g", 0, 0, 3 * kSecond);
+  write_bytes("/task/result", "jostle_msgs/msg/GoalResult", 4 * kSecond, old_result("g", false, "timeout after 60 s"));
+  begin("h", 5 * kSecond), observe("h", 0, 6 * kSecond, 0, seen_at(0)), plan("h", 0, 0, 7 * kSecond);
+  write_bytes("/task/result", "jostle_msgs/msg/GoalResult", 8 * kSecond, old_result("h", false, "dropped can"));
+
+  const auto runs_result = read_runs(*reader());
+
+  ASSERT_TRUE(runs_result) << runs_result.error().message;
+  ASSERT_EQ(runs_result->size(), 2u);
+  EXPECT_FALSE(runs_result->front().concluded());
+  EXPECT_TRUE(runs_result->back().concluded());
 }
 
 TEST_F(Recorded, WhatComesTwiceOrLateCountsOnce) {

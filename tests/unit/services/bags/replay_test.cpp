@@ -78,6 +78,7 @@ class Replay : public testing::Test {
     if (!outcome_result) throw std::runtime_error(outcome_result.error().message);
     recorded.result.emplace();
     recorded.result->success(outcome_result->success);
+    recorded.result->ending(static_cast<std::uint8_t>(outcome_result->ending));
     recorded.result->reason(outcome_result->reason);
     return recorded;
   }
@@ -173,7 +174,7 @@ TEST_F(Replay, ARunThatWasInterruptedIsEqualAsFarAsItGoes) {
   EXPECT_TRUE(again(recorded).comparison.bit_equal());
 
   recorded.result.emplace();  // it says that it was over: then nothing may follow
-  recorded.result->reason("target grasped");
+  recorded.result->ending(static_cast<std::uint8_t>(planners::Ending::kSucceeded));
   const ReplayReport report = again(recorded);
   ASSERT_FALSE(report.comparison.bit_equal());
   EXPECT_EQ(report.comparison.first->field, "what comes next");

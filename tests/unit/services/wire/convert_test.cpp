@@ -148,7 +148,7 @@ TEST(ConvertOutcome, KeepsTheWorkersRefusal) {
 }
 
 TEST(ConvertOutcome, RefusesWhatMakesNoSense) {
-  const std::pair<const char*, std::function<void(jostle_msgs::msg::TaskResult&)>> cases[] = {
+  const std::pair<const char*, std::function<void(jostle_msgs::msg::AssignmentResult&)>> cases[] = {
       {"end", [](auto& wire) { wire.end(200); }},
       {"cost", [](auto& wire) { wire.cost(std::numeric_limits<double>::quiet_NaN()); }},
       {"step_costs", [](auto& wire) { wire.steps(3); }},

@@ -179,11 +179,11 @@ TEST(Roles, LetAWorkerSayResultsAndNothingToARobot) {
   for (const char* topic : {"rt/pool/worker", "rt/pool/result", "rt/doctor/there", "rt/doctor/back"})
     EXPECT_TRUE(matches(worker.publish, topic)) << topic;
   for (const char* topic :
-       {"rt/robot/command", "rt/x/robot/command", "rt/pool/robot/command", "rt/pool/task/w1", "rt/pool/world",
+       {"rt/robot/command", "rt/x/robot/command", "rt/pool/robot/command", "rt/pool/assignment/w1", "rt/pool/world",
         "rt/pool/control", "rt/task/goal", "rt/tf", "rt/x/pool/result", "rt/x/doctor/back"}) {
     EXPECT_FALSE(matches(worker.publish, topic)) << topic;
   }
-  for (const char* topic : {"rt/pool/world", "rt/pool/control", "rt/pool/task/w0123456789abcdef"}) {
+  for (const char* topic : {"rt/pool/world", "rt/pool/control", "rt/pool/assignment/w0123456789abcdef"}) {
     EXPECT_TRUE(matches(worker.subscribe, topic)) << topic;
   }
   for (const char* topic : {"rt/robot/command", "rt/x/robot/command", "rt/joint_states", "rt/task/goal"}) {

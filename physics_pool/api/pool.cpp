@@ -8,30 +8,59 @@
 
 namespace jostle::physics_pool {
 
+Result<std::vector<BatchReply>> Pool::run_all(std::span<const RolloutBatch> batches, TimePoint deadline,
+                                              std::stop_token stop) {
+  std::vector<BatchReply> replies;
+  for (const RolloutBatch& batch : batches) {
+    auto reply_result = run(batch, deadline, stop);
+    if (!reply_result) return reply_result.error();
+    replies.push_back(std::move(reply_result).value());
+  }
+  return replies;
+}
+
 Result<BatchReply> AsyncPool::run(const RolloutBatch& batch, TimePoint deadline, std::stop_token stop) {
-  std::mutex mutex;  // guards reply
+  auto replies_result = run_all({&batch, 1}, deadline, std::move(stop));
+  if (!replies_result) return replies_result.error();
+  return std::move(replies_result->front());
+}
+
+Result<std::vector<BatchReply>> AsyncPool::run_all(std::span<const RolloutBatch> batches, TimePoint deadline,
+                                                   std::stop_token stop) {
+  std::mutex mutex;  // guards missing, failure and replies
   std::condition_variable_any arrived;
-  std::optional<Result<BatchReply>> reply;
-  auto ticket_result = submit(batch, [&](Result<BatchReply> result) {
-    const std::lock_guard lock(mutex);
-    reply.emplace(std::move(result));
-    arrived.notify_one();
-  });
-  if (!ticket_result) return ticket_result.error();
-  std::unique_ptr<Ticket> ticket = std::move(ticket_result).value();
+  std::size_t missing = batches.size();
+  std::optional<Error> failure;
+  std::vector<BatchReply> replies(batches.size());
+  std::vector<std::unique_ptr<Ticket>> tickets;  // go first: on_reply has left before its captures do
+  for (std::size_t i = 0; i < batches.size(); ++i) {
+    auto ticket_result = submit(batches[i], [&, i](Result<BatchReply> result) {
+      const std::lock_guard lock(mutex);
+      --missing;
+      if (result) {
+        replies[i] = std::move(result).value();
+      } else if (!failure) {
+        failure = result.error();
+      }
+      arrived.notify_one();
+    });
+    if (!ticket_result) return ticket_result.error();
+    tickets.push_back(std::move(ticket_result).value());
+  }
 
   std::unique_lock lock(mutex);
-  if (!arrived.wait_until(lock, stop, deadline, [&] { return reply.has_value(); })) {
-    lock.unlock();
-    const std::uint32_t missing = ticket->missing();
-    ticket.reset();  // nothing of this batch runs after the call
-    if (stop.stop_requested()) return Error{Code::kCancelled, "batch: cancelled by its caller"};
-    return Error{Code::kDeadline,
-                 fmt::format("batch: {} of {} rollouts were unfinished at the deadline", missing, batch.samples)};
-  }
+  const bool over = arrived.wait_until(lock, stop, deadline, [&] { return missing == 0 || failure; });
   lock.unlock();
-  ticket.reset();  // on_reply has left before its captures go
-  return *std::move(reply);
+  std::uint64_t unfinished = 0, samples = 0;
+  for (std::size_t i = 0; i < tickets.size(); ++i) {
+    unfinished += tickets[i]->missing();
+    samples += batches[i].samples;
+  }
+  tickets.clear();  // nothing of these batches runs after the call
+  if (failure) return *failure;
+  if (over) return replies;
+  if (stop.stop_requested()) return Error{Code::kCancelled, "batch: cancelled by its caller"};
+  return Error{Code::kDeadline, fmt::format("batch: {} of {} rollouts were unfinished at the deadline", unfinished, samples)};
 }
 
 }  // namespace jostle::physics_pool

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -61,6 +62,12 @@ class Pool {
 
   virtual Result<BatchReply> run(const RolloutBatch& batch, TimePoint deadline, std::stop_token stop = {}) = 0;
 
+  /// Several batches, whose rollouts may share the workers: replies in their order. Equal to `run` of each, only
+  /// sooner where the pool can have several under way.
+  /// Errors   the first that a batch has; the others are cancelled
+  virtual Result<std::vector<BatchReply>> run_all(std::span<const RolloutBatch> batches, TimePoint deadline,
+                                                  std::stop_token stop = {});
+
   virtual PoolStatus status() const = 0;
 };
 
@@ -85,6 +92,10 @@ class AsyncPool : public Pool {
 
   /// Submits and waits.
   Result<BatchReply> run(const RolloutBatch& batch, TimePoint deadline, std::stop_token stop = {}) final;
+
+  /// Submits all and waits.
+  Result<std::vector<BatchReply>> run_all(std::span<const RolloutBatch> batches, TimePoint deadline,
+                                          std::stop_token stop = {}) final;
 };
 
 }  // namespace jostle::physics_pool

@@ -122,6 +122,17 @@ Result<void> validate(const RolloutBatch& batch) {
     return invalid("fidelity.time_step", fmt::format("{} s", batch.fidelity.time_step),
                  fmt::format("0 for the world's own, at most {} s", kMaxTimeStep));
   }
+  if (batch.law.stream >= kSamplingStreams) {
+    return invalid("law.stream", std::to_string(batch.law.stream), fmt::format("less than {}", kSamplingStreams));
+  }
+  for (const auto& [field, value] : {std::pair("noise.sigma", batch.noise.sigma), {"noise.slope", batch.noise.slope}}) {
+    if (value >= 0 && std::isfinite(value)) continue;
+    return invalid(field, fmt::format("{}", value), "a finite number >= 0");
+  }
+  if (!batch.noise.is_off() && batch.fidelity != Fidelity{}) {
+    return invalid("noise", "it together with a fidelity",
+                   "one of them: what is frozen gets no noise, and noise belongs to the world's own time step");
+  }
   if (batch.law.scales.empty() || batch.law.scales.size() > kMaxScales) {
     return invalid("law.scales", fmt::format("{} values", batch.law.scales.size()), fmt::format("1 to {}", kMaxScales));
   }

@@ -15,6 +15,7 @@
 #include "idl/types/state.hpp"
 #include "physics_pool/objective/objective.hpp"
 #include "physics_pool/objective/step_facts.hpp"
+#include "physics_pool/sampling/velocity_noise.hpp"
 
 namespace jostle::physics_pool {
 
@@ -37,7 +38,7 @@ struct SamplingLaw {
   /// refine and explore at once.
   std::vector<double> scales{1.0};
   std::uint64_t seed = 0;
-  std::uint32_t stream = 0;  ///< the planner's iteration: same seed, fresh noise
+  std::uint32_t stream = 0;  ///< the planner's iteration: same seed, fresh noise; below kSamplingStreams
   double persistence = 0.0;  ///< in [0, 1): of the noise from step to step; 0 is white
   /// Empty, or the draw that each sample stands for: a batch of a few picked from
   /// the draws of a larger one.
@@ -88,6 +89,9 @@ struct RolloutBatch {
   bool stop_on_success = false;  ///< Alg. 1, lines 8-9
   int min_steps = 0;             ///< n_min: success counts from this control step (0-based) on
   bool want_all_trajectories = false;
+  /// Of physics, drawn by (sample, engine step, degree of freedom), so that all candidates can meet the same: a batch
+  /// of one candidate has as many samples as noises. Wants the fine model: what is frozen would get none.
+  VelocityNoise noise;
   Fidelity fidelity;
   Priority priority = Priority::kNormal;
   /// Scheduling studies only: wait this long per rollout and simulate nothing.

@@ -2,6 +2,7 @@
 /// \file
 /// Dynamics: what brings a state from one control step to the next.
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -9,6 +10,7 @@
 
 #include "idl/types/state.hpp"
 #include "physics_pool/local/world.hpp"
+#include "physics_pool/sampling/velocity_noise.hpp"
 
 namespace jostle::physics_pool {
 
@@ -19,6 +21,13 @@ struct Advance {
   bool interrupted = false;
   StepFacts facts;  ///< over all its engine steps
   std::string diverged;  ///< empty, or why the state is of no use
+};
+
+/// The noise of one stretch of a rollout or of a world.
+struct Disturbance {
+  VelocityNoise noise;
+  NoiseStream stream;
+  std::uint64_t first_step = 0;  ///< engine steps done before
 };
 
 /// x <- F(x, u), a pure function of its arguments: nothing of the engine's memory
@@ -35,8 +44,12 @@ class Dynamics {
 
   /// Runs `engine_steps` from x under u. `interrupted` is asked before each step;
   /// may be empty. After an interruption or a divergence x is of no use.
+  /// `disturbance`: of the fine model only (`validate` of batches sees to it).
   virtual Advance advance(State& x, std::span<const double> u, int engine_steps,
-                          const std::function<bool()>& interrupted = {}) = 0;
+                          const std::function<bool()>& interrupted = {}, const Disturbance& disturbance = {}) = 0;
+
+  /// Memory it holds at present.
+  virtual std::size_t bytes() const = 0;
 };
 
 }  // namespace jostle::physics_pool

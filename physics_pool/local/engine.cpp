@@ -101,4 +101,8 @@ void DataDeleter::operator()(mjData* data) const { mj_deleteData(data); }
 
 const char* engine_version() { return mj_versionString(); }
 
+std::size_t bytes_of(const mjData& data) {
+  return sizeof(mjData) + static_cast<std::size_t>(data.nbuffer) + sizeof(mjtNum) * static_cast<std::size_t>(data.nstack);
+}
+
 }  // namespace jostle::physics_pool

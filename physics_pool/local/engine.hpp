@@ -5,6 +5,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <cstddef>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -41,6 +42,9 @@ void forget(const mjModel& model, mjData& data);
 /// Empty, or why the state is of no use: a warning since forget(), or a number
 /// that is not finite.
 std::string divergence(const mjModel& model, const mjData& data);
+
+/// Memory that scratch data holds.
+std::size_t bytes_of(const mjData& data);
 
 /// geom_user[0] of the surface: it supports a body only while the body's
 /// centre is above it. MuJoCo's planes are infinite, yet they give steadier

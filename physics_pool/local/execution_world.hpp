@@ -3,18 +3,18 @@
 /// The world in which actions happen (Sec. 3.3): simulated, disturbed.
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "physics_pool/local/simulator.hpp"
 
 namespace jostle::physics_pool {
 
-/// Owns one moving world. With sigma = 0 an action of Delta_t ends bit-equal
+/// Owns one moving world. Without noise an action of Delta_t ends bit-equal
 /// to F of the planner. One thread at a time.
 class ExecutionWorld {
  public:
-  /// `velocity_sigma`: standard deviation of the noise of Eq. 3.3, added to
-  /// every velocity of robot and objects after every engine step.
-  ExecutionWorld(WorldPtr world, double velocity_sigma, std::uint64_t seed);
+  explicit ExecutionWorld(WorldPtr world, const VelocityNoise& noise = {});
 
   /// Starts to apply u (m/s, rad/s) from the present state.
   void begin(std::span<const double> u);
@@ -27,9 +27,11 @@ class ExecutionWorld {
   double time() const { return steps_ * simulator_.world().time_step(); }  ///< s
 
  private:
+  static constexpr NoiseStream kStream{.purpose = Purpose::kExecutedNoise};
+
   Simulator simulator_;
-  double sigma_;
-  std::uint64_t seed_;
+  VelocityNoise noise_;
+  std::vector<double> u_;  // at work
   std::uint64_t steps_ = 0;
   State state_;
 };

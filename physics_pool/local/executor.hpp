@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstddef>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -36,9 +37,12 @@ using BatchRunPtr = std::shared_ptr<BatchRun>;
 
 class Executor {
  public:
+  static constexpr std::size_t kBytesPerThread = std::size_t{128} << 20;
+
   /// `cores`: thread i stays on cores[i], if there are any; else the system chooses.
+  /// `bytes_per_thread`: of simulators that a thread keeps for the next batch; the one in use is always kept.
   /// Throws std::system_error when this process may not use one of them.
-  explicit Executor(int threads, const std::vector<int>& cores = {});
+  explicit Executor(int threads, const std::vector<int>& cores = {}, std::size_t bytes_per_thread = kBytesPerThread);
   /// Skips what is queued and waits for what runs (a millisecond once its
   /// signals are cancelled; a whole rollout otherwise).
   ~Executor();
@@ -56,6 +60,7 @@ class Executor {
 
   void work(std::stop_token stop, int thread);
 
+  const std::size_t bytes_per_thread_;
   std::mutex mutex_;  // guards jobs_
   std::condition_variable_any wake_;
   std::deque<Job> jobs_;

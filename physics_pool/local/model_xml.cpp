@@ -177,13 +177,23 @@ void write_geom(Writer& xml, const RobotGeom& geom, bool has_mass, int& mesh) {
            has_mass ? fmt::format(R"( mass="{}")", geom.mass) : "", geom.material, kRobot, kWall, kRobotMark);
 }
 
+// xx, yy, zz, xy, xz, yz along the link's axes: the engine takes a full matrix in no other frame.
+std::array<double, 6> moments_in_link(const Inertia& inertia) {
+  const auto& [xx, yy, zz, xy, xz, yz] = inertia.moments;
+  Eigen::Matrix3d I;
+  I << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  const Eigen::Matrix3d R = transform(inertia.pose).linear();
+  I = (R * I * R.transpose()).eval();
+  return {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)};
+}
+
 void write_link(Writer& xml, const RobotModel& robot, int index, const Pose& place, int& mesh) {
   const Link& link = robot.links[static_cast<std::size_t>(index)];
-  xml.line(R"(<body name="{}" {}>)", quoted(link.name), pose_text(place));
+  xml.line(R"(<body name="{}{}" {}>)", kLinkPrefix, quoted(link.name), pose_text(place));
   for (const int joint : link.joints) write_joint(xml, robot.joints[static_cast<std::size_t>(joint)]);
   if (link.inertia) {
-    xml.line(R"(<inertial {} mass="{}" fullinertia="{}"/>)", pose_text(link.inertia->pose), link.inertia->mass,
-             fmt::join(link.inertia->moments, " "));
+    xml.line(R"(<inertial pos="{}" mass="{}" fullinertia="{}"/>)", fmt::join(link.inertia->pose.position, " "),
+             link.inertia->mass, fmt::join(moments_in_link(*link.inertia), " "));
   }
   for (const RobotGeom& geom : link.geoms) write_geom(xml, geom, !link.inertia, mesh);
   for (std::size_t i = 0; i < robot.links.size(); ++i) {

@@ -9,6 +9,9 @@
 
 namespace jostle::physics_pool {
 
+/// Before the names of the robot's bodies: URDF files like to have a link "world", which is the engine's own.
+inline constexpr const char* kLinkPrefix = "link:";
+
 /// What of a scene goes into a model.
 struct ModelContent {
   /// Objects with freedom, from the first on; the others are mocap bodies, which

@@ -225,8 +225,14 @@ void ReducedSimulator::run(Advance& result, State& x, std::span<const double> u,
   part->read(layout, x);
 }
 
+std::size_t ReducedSimulator::bytes() const {
+  std::size_t sum = 0;
+  for (const auto& part : parts_) sum += part ? bytes_of(*part->data) : 0;
+  return sum;
+}
+
 Advance ReducedSimulator::advance(State& x, std::span<const double> u, int engine_steps,
-                                  const std::function<bool()>& interrupted) {
+                                  const std::function<bool()>& interrupted, const Disturbance&) {
   Advance result;
   try {
     freeze(x);

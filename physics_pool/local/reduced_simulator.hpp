@@ -39,7 +39,8 @@ class ReducedSimulator final : public Dynamics {
   double time_step() const override { return time_step_; }
 
   Advance advance(State& x, std::span<const double> u, int engine_steps,
-                  const std::function<bool()>& interrupted = {}) override;
+                  const std::function<bool()>& interrupted = {}, const Disturbance& disturbance = {}) override;
+  std::size_t bytes() const override;
 
  private:
   struct Part;

@@ -1,8 +1,11 @@
 #include "physics_pool/local/simulator.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "physics_pool/local/engine.hpp"
+#include "physics_pool/robot/kinematics.hpp"
 
 namespace jostle::physics_pool {
 
@@ -18,9 +21,11 @@ void Simulator::begin(const State& x, std::span<const double> u) {
 
 void Simulator::step() {
   const Scene& scene = world_->scene();
-  // The engine's own step where there is nothing to do in its middle: RK4 has none.
-  if (scene.fixtures.empty() && !scene.robot.model.carries_itself) {
+  // The engine's own step where there is nothing to do in its middle. RK4 has no middle: its contacts are those of its
+  // last stage.
+  if (scene.physics.integrator == "rk4" || (scene.fixtures.empty() && !scene.robot.model.carries_itself)) {
     mj_step(world_->model(), data_.get());
+    if (!scene.fixtures.empty()) note_contacts(*world_->model(), *data_, scene, facts_);
     return;
   }
   mj_step1(world_->model(), data_.get());
@@ -36,10 +41,17 @@ void Simulator::read(State& x) const {
   x.v.assign(data_->qvel, data_->qvel + model.nv);
 }
 
-void Simulator::add_velocity(int dof, double amount) { data_->qvel[dof] += amount; }
+void Simulator::disturb(const VelocityNoise& noise, const NoiseStream& stream, std::uint64_t step,
+                        std::span<const double> u) {
+  const double sigma = noise.sigma + noise.slope * control_norm(world_->scene().robot.model, u);
+  if (sigma == 0) return;
+  for (int dof = 0; dof < world_->model()->nv; ++dof) data_->qvel[dof] += sigma * velocity_draw(noise, stream, step, dof);
+}
+
+std::size_t Simulator::bytes() const { return bytes_of(*data_); }
 
 Advance Simulator::advance(State& x, std::span<const double> u, int engine_steps,
-                           const std::function<bool()>& interrupted) {
+                           const std::function<bool()>& interrupted, const Disturbance& disturbance) {
   Advance result;
   try {
     begin(x, u);
@@ -49,6 +61,9 @@ Advance Simulator::advance(State& x, std::span<const double> u, int engine_steps
         return result;
       }
       step();
+      if (!disturbance.noise.is_off()) {
+        disturb(disturbance.noise, disturbance.stream, disturbance.first_step + result.engine_steps, u);
+      }
       ++result.engine_steps;
     }
     result.diverged = divergence();
@@ -62,7 +77,7 @@ Advance Simulator::advance(State& x, std::span<const double> u, int engine_steps
   return result;
 }
 
-State separate(const World& world, const State& x, double depth, int rounds) {
+Result<Separated> separate(const World& world, const State& x, double depth, int rounds) {
   // Without weight nothing rubs on the surface, which would hold objects of a
   // millimetre or two inside each other; and 5 ms close a gap six times faster
   // than 2 ms (acceleration · h^2 per round).
@@ -71,21 +86,27 @@ State separate(const World& world, const State& x, double depth, int rounds) {
   weightless->opt.timestep = 0.005;
   const mjModel* model = weightless.get();
   const DataPtr data(mj_makeData(model));
-  State result = x;
-  std::ranges::fill(result.v, 0.0);
-  std::ranges::copy(result.q, data->qpos);
-  for (int round = 0; round < rounds; ++round) {
-    mj_forward(model, data.get());
-    const mjContact* begin = data->contact;
-    const bool apart =
-        std::none_of(begin, begin + data->ncon, [&](const mjContact& contact) { return contact.dist < -depth; });
-    if (apart) break;
-    std::fill_n(data->qvel, model->nv, 0.0);
-    mj_step(model, data.get());
-    // The robot's place is measured better than any object's: it yields nothing.
-    std::copy_n(x.q.begin(), world.geometry().layout.robot_joints(), data->qpos);
+  Separated result{.x = x};
+  std::ranges::fill(result.x.v, 0.0);
+  std::ranges::copy(result.x.q, data->qpos);
+  try {
+    for (int round = 0; round < rounds; ++round) {
+      mj_forward(model, data.get());
+      result.deepest = 0.0;
+      for (int i = 0; i < data->ncon; ++i) result.deepest = std::max(result.deepest, -data->contact[i].dist);
+      if (result.deepest <= depth) break;
+      std::fill_n(data->qvel, model->nv, 0.0);
+      mj_step(model, data.get());
+      // The robot's place is measured better than any object's: it yields nothing.
+      std::copy_n(x.q.begin(), world.geometry().layout.robot_joints(), data->qpos);
+    }
+  } catch (const EngineError& error) {
+    return Error{Code::kInternal, fmt::format("separate: the engine diverged: {}", error.what())};
   }
-  result.q.assign(data->qpos, data->qpos + model->nq);
+  if (const std::string why = divergence(*model, *data); !why.empty()) {
+    return Error{Code::kInternal, "separate: the engine diverged: " + why};
+  }
+  result.x.q.assign(data->qpos, data->qpos + model->nq);
   return result;
 }
 

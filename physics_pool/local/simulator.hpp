@@ -16,16 +16,18 @@ class Simulator final : public Dynamics {
   double time_step() const override { return world_->time_step(); }
 
   Advance advance(State& x, std::span<const double> u, int engine_steps,
-                  const std::function<bool()>& interrupted = {}) override;
+                  const std::function<bool()>& interrupted = {}, const Disturbance& disturbance = {}) override;
+  std::size_t bytes() const override;
 
   /// The same in parts, for worlds that are observed or disturbed while they
   /// move: begin once, then step as often as needed.
   void begin(const State& x, std::span<const double> u);
   void step();
+  /// Adds the noise that belongs after engine step `step` under u.
+  void disturb(const VelocityNoise& noise, const NoiseStream& stream, std::uint64_t step, std::span<const double> u);
   std::string divergence() const;
   void read(State& x) const;
   const StepFacts& facts() const { return facts_; }  ///< since begin()
-  void add_velocity(int dof, double amount);
 
  private:
   WorldPtr world_;
@@ -33,10 +35,17 @@ class Simulator final : public Dynamics {
   StepFacts facts_;  // since begin()
 };
 
+/// What separate() came to.
+struct Separated {
+  State x;
+  double deepest = 0.0;  ///< m, how far two bodies are in each other still; above `depth` if the rounds did not do
+};
+
 /// Moves objects apart that overlap in x, as happens when a belief of shapes
 /// meets a measurement of poses: steps the world with its velocities held at
 /// zero until no two bodies are deeper in each other than `depth` metres, or
 /// for `rounds` steps at most. The robot stays where it is. Cf. Eq. 6.9.
-State separate(const World& world, const State& x, double depth = 0.0005, int rounds = 200);
+/// Error kInternal: the engine diverged.
+Result<Separated> separate(const World& world, const State& x, double depth = 0.0005, int rounds = 200);
 
 }  // namespace jostle::physics_pool

@@ -58,7 +58,8 @@ Result<void> check_start(const World& world) {
     if (geom >= first_object) return fmt::format("object '{}'", scene.objects[static_cast<std::size_t>(geom - first_object)].name);
     const char* known = mj_id2name(&model, mjOBJ_GEOM, geom);
     const char* body = mj_id2name(&model, mjOBJ_BODY, model.geom_bodyid[geom]);
-    return known ? fmt::format("'{}'", known) : fmt::format("robot link '{}'", body ? body : "?");
+    if (known) return fmt::format("'{}'", known);
+    return fmt::format("robot link '{}'", body ? std::string_view(body).substr(std::strlen(kLinkPrefix)) : "?");
   };
   for (int i = 0; i < data->ncon; ++i) {
     const mjContact& contact = data->contact[i];
@@ -95,6 +96,8 @@ Result<WorldPtr> World::compile(const Scene& scene, Purpose purpose) {
   if (auto ok = check_start(*world); !ok) return ok.error();
   return world;
 }
+
+std::size_t World::bytes() const { return static_cast<std::size_t>(mj_sizeModel(model_.get())); }
 
 const mjModel* World::reduced_model(int free) const {
   const std::lock_guard lock(mutex_);

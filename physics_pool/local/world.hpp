@@ -2,6 +2,7 @@
 /// \file
 /// World: a compiled scene.
 
+#include <cstddef>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -31,6 +32,7 @@ class World {
   const Hash& hash() const { return hash_; }
   const TaskGeometry& geometry() const { return geometry_; }
   const mjModel_* model() const { return model_.get(); }
+  std::size_t bytes() const;  ///< of the compiled model, without reduced ones
   double time_step() const { return scene_.physics.time_step; }
 
   /// The same world in which only the first `free` objects can move (see

@@ -314,7 +314,8 @@ Result<BatchReply> PararealPool::run(const RolloutBatch& batch, TimePoint deadli
     known = found->second.get();
   }
   if (auto ok = validate(batch, known->geometry.layout, known->scene.physics.time_step); !ok) return ok.error();
-  if (batch.wait) return pool_.run(batch, deadline, stop);
+  // Noise is drawn by the step within the whole rollout, so slices would draw other numbers.
+  if (batch.wait || !batch.noise.is_off()) return pool_.run(batch, deadline, stop);
   std::uint32_t whole = 0;
   if (options_.split_by_itself) {
     auto split_result = choose(*known, batch, deadline, stop);

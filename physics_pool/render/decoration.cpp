@@ -45,11 +45,12 @@ void add_pad(const mjModel& model, const mjData& data, const char* finger, mjvSc
 }
 
 void add_wrist(const mjModel& model, const mjData& data, mjvScene& scene) {
-  const int body = mj_name2id(&model, mjOBJ_BODY, "gripper");
+  const int palm_geom = mj_name2id(&model, mjOBJ_GEOM, "palm");
+  const int body = model.geom_bodyid[palm_geom];
   const mjtNum* position = data.xpos + 3 * body;
   const mjtNum* rotation = data.xmat + 9 * body;
   // Half sizes of the palm and of what is behind it.
-  const mjtNum* palm = model.geom_size + 3 * mj_name2id(&model, mjOBJ_GEOM, "palm");
+  const mjtNum* palm = model.geom_size + 3 * palm_geom;
   const mjtNum* arm = model.geom_size + 3 * mj_name2id(&model, mjOBJ_GEOM, "arm");
   const double top = palm[2], wrist = -2 * palm[0], elbow = wrist - 2 * arm[0];
   const auto cap = [&](double x, double radius, double half_height, const Colour& colour) {
@@ -79,7 +80,6 @@ void decorate(const SceneTask& task, const mjModel& model, const mjData& data, m
   for (const char* part : {"palm", "arm", "finger_left", "finger_right"}) {
     if (mj_name2id(&model, mjOBJ_GEOM, part) < 0) return;
   }
-  if (mj_name2id(&model, mjOBJ_BODY, "gripper") < 0) return;
   add_pad(model, data, "finger_left", scene);
   add_pad(model, data, "finger_right", scene);
   add_wrist(model, data, scene);

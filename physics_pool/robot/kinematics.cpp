@@ -1,5 +1,7 @@
 #include "physics_pool/robot/kinematics.hpp"
 
+#include <cmath>
+
 namespace jostle::physics_pool {
 
 Eigen::Isometry3d link_pose(const RobotModel& model, const Eigen::Isometry3d& base, std::span<const double> q, int link) {
@@ -22,6 +24,17 @@ Eigen::Isometry3d link_pose(const RobotModel& model, const Eigen::Isometry3d& ba
 Eigen::Isometry3d tool_pose(const RobotModel& model, const Eigen::Isometry3d& base, std::span<const double> q) {
   if (!model.hand) return link_pose(model, base, q, static_cast<int>(model.links.size()) - 1);
   return link_pose(model, base, q, model.hand->link) * transform(model.hand->pose);
+}
+
+double control_norm(const RobotModel& model, std::span<const double> u) {
+  constexpr double kLever = 0.1;  // m
+  double sum = 0.0;
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    const auto joint = static_cast<std::size_t>(model.axes[i].joints[0].first);
+    const double speed = u[i] * (model.joints[joint].kind == JointKind::kHinge ? kLever : 1.0);
+    sum += speed * speed;
+  }
+  return std::sqrt(sum);
 }
 
 }  // namespace jostle::physics_pool

@@ -15,4 +15,7 @@ Eigen::Isometry3d link_pose(const RobotModel& model, const Eigen::Isometry3d& ba
 /// X_WT of the tool: the hand's frame G where there is a hand, else the last link's.
 Eigen::Isometry3d tool_pose(const RobotModel& model, const Eigen::Isometry3d& base, std::span<const double> q);
 
+/// |u|, m/s: the Euclidean norm over axes, of which those that turn joints count with a lever of 0.1 m.
+double control_norm(const RobotModel& model, std::span<const double> u);
+
 }  // namespace jostle::physics_pool

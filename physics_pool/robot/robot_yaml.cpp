@@ -282,7 +282,7 @@ Result<RobotModel> builtin_robot(std::string_view name) {
 }
 
 RobotPath robot_path(const fs::path& base) {
-  RobotPath path{.base = base};
+  RobotPath path{.opens_files = true, .base = base};
   add_folders(path, "JOSTLE_MODELS", "");
   add_folders(path, "ROS_PACKAGE_PATH", "");
   add_folders(path, "AMENT_PREFIX_PATH", "share");
@@ -291,6 +291,7 @@ RobotPath robot_path(const fs::path& base) {
 
 Result<RobotModel> find_robot(const std::string& name, const RobotPath& path) {
   if (auto model_result = builtin_robot(name); model_result || model_result.error().code != Code::kNotFound) return model_result;
+  if (!path.opens_files) return builtin_robot(name);
   std::vector<fs::path> folders{path.base};
   folders.insert(folders.end(), path.folders.begin(), path.folders.end());
   std::vector<std::string> tried;

@@ -22,8 +22,10 @@ std::string robot_text(const RobotModel& model, int indent);
 /// Error kNotFound naming those there are.
 Result<RobotModel> builtin_robot(std::string_view name);
 
-/// Where robots are looked for, and `package://NAME/` of their meshes.
+/// Where robots are looked for, and `package://NAME/` of their meshes. An empty one opens no files at all, as befits a
+/// scene that came from elsewhere.
 struct RobotPath {
+  bool opens_files = false;
   std::filesystem::path base;                 ///< of names that are relative paths: the scene file's folder
   std::vector<std::filesystem::path> folders;  ///< of models and ROS packages, in this order
 };

@@ -9,7 +9,8 @@ namespace {
 
 std::array<std::uint64_t, 2> bits(std::uint64_t seed, const DrawIndex& index) {
   const r123::Philox4x32::key_type key{{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)}};
-  const r123::Philox4x32::ctr_type counter{{index.stream, index.sample, index.step, index.axis}};
+  const std::uint32_t what = static_cast<std::uint32_t>(index.purpose) << 24 | index.axis;
+  const r123::Philox4x32::ctr_type counter{{index.stream, index.sample, index.step, what}};
   const r123::Philox4x32::ctr_type random = r123::Philox4x32{}(counter, key);
   const auto join = [](std::uint32_t high, std::uint32_t low) {
     return (static_cast<std::uint64_t>(high) << 32) | low;

@@ -9,12 +9,23 @@
 
 namespace jostle::physics_pool {
 
+/// What a draw is for. Draws for different purposes are independent, whatever their other numbers.
+enum class Purpose : std::uint32_t {
+  kControls = 0,        ///< a planner's samples, below kSamplingStreams; scenes and beliefs have the streams above
+  kPredictedNoise = 1,  ///< physics of rollouts
+  kExecutedNoise = 2,   ///< physics of the world in which actions happen
+};
+
+/// Planners use the streams below this; each of the generators of scenes and beliefs has one of its own above.
+inline constexpr std::uint32_t kSamplingStreams = 0x9000;
+
 /// Names one draw. Two draws with different indices are independent.
 struct DrawIndex {
+  Purpose purpose = Purpose::kControls;
   std::uint32_t stream = 0;
   std::uint32_t sample = 0;
   std::uint32_t step = 0;
-  std::uint32_t axis = 0;
+  std::uint32_t axis = 0;  ///< less than 2^24
 };
 
 /// One standard normal number (Box-Muller).

@@ -48,6 +48,22 @@ std::optional<Footprint> footprint(const Eigen::Isometry3d& X_WG, const RobotGeo
   return seen;
 }
 
+// What of a fixture is no higher than `height` above the surface, from above; of one that leans, what is around it.
+std::optional<Footprint> footprint(const Fixture& fixture, double height) {
+  const Eigen::Isometry3d X = transform(fixture.pose);
+  const Eigen::Vector3d half = fixture.shape == Shape::kBox
+                                   ? Eigen::Vector3d(fixture.size[0], fixture.size[1], fixture.size[2]) / 2
+                                   : Eigen::Vector3d(fixture.radius, fixture.radius, fixture.height / 2);
+  const Eigen::Vector3d reach = X.linear().cwiseAbs() * half;
+  const Eigen::Vector3d centre = X.translation();
+  if (centre.z() - reach.z() >= height || centre.z() + reach.z() <= 0) return {};
+  const RobotGeom body{.shape = fixture.shape == Shape::kBox ? GeomShape::kBox : GeomShape::kCylinder,
+                       .size = fixture.size,
+                       .radius = fixture.radius};
+  if (const auto seen = footprint(X, body)) return seen;
+  return Footprint{.x = centre.x(), .y = centre.y(), .outline = {.half_x = reach.x(), .half_y = reach.y()}};
+}
+
 // Of a robot that moves in the plane; empty for others.
 std::vector<Footprint> footprint(const SceneRobot& robot) {
   std::vector<Footprint> parts;
@@ -176,6 +192,21 @@ Result<void> check_robot(const SceneRobot& robot, const Locate& locate) {
     const std::string& message = ok.error().message;  // "robot.links[2]…: got …"
     return Error{ok.error().code, fmt::format("{}: {}", locate(message.substr(0, message.find_first_of("[:"))), message)};
   }
+  const auto& [p, orientation] = robot.base;
+  double length = 0.0;
+  for (const double component : orientation) length += component * component;
+  if (auto ok = check(locate, {"robot.base.", "robot.base."},
+                      {{"position[0]", p[0], -10, 10, "m"},
+                       {"position[1]", p[1], -10, 10, "m"},
+                       {"position[2]", p[2], -10, 10, "m"},
+                       {"orientation", length, 1 - 1e-6, 1 + 1e-6, "as the squared length of a unit quaternion"}});
+      !ok) {
+    return ok;
+  }
+  if (as_planar(robot.model) && !(robot.base == Pose{})) {
+    return invalid(locate, {"robot.base", "robot.base"},
+                   "got a pose for a robot that moves in the surface's plane, wanted none: robot.start says where it is");
+  }
   if (robot.q.size() != robot.model.joints.size()) {
     return invalid(locate, {"robot.start", "robot.start"},
                    fmt::format("got {} joints, wanted {}", robot.q.size(), robot.model.joints.size()));
@@ -201,7 +232,9 @@ Result<void> check_discs(const Scene& scene, const Locate& locate) {
                   {".y", disc.y, bounds.low_y(), bounds.high_y(), "m, on the surface"},
                   {".radius", disc.radius, kSmallest, kLargest, "m"}});
   };
-  if (auto ok = check_disc("task.goal", scene.task.goal); !ok) return ok;
+  if (find_task_kind(scene.task.kind)->has_goal) {
+    if (auto ok = check_disc("task.goal", scene.task.goal); !ok) return ok;
+  }
   if (!scene.task.obstacle) return {};
   return check_disc("task.obstacle", *scene.task.obstacle);
 }
@@ -267,7 +300,11 @@ bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap) {
 }
 
 bool is_free(const Scene& scene, const SceneObject& object, double gap) {
-  return !overlaps_robot(scene, object, gap) &&
+  const auto meets = [&](const Fixture& fixture) {
+    const auto part = footprint(fixture, 2 * object.rest_height());
+    return part && footprint_gap(*part, footprint(object)) < gap;
+  };
+  return !overlaps_robot(scene, object, gap) && std::ranges::none_of(scene.fixtures, meets) &&
          std::ranges::none_of(scene.objects, [&](const SceneObject& other) { return overlap(object, other, gap); });
 }
 

@@ -1,5 +1,8 @@
 #include "physics_pool/uncertainty/belief.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -76,6 +79,21 @@ State observed_state(const Scene& execution, const Scene& belief, const State& t
     }
   }
   return seen;
+}
+
+Result<void> check_belief(const Scene& execution, const Scene& belief) {
+  if (belief.robot.model != execution.robot.model) {
+    return invalid("robot", fmt::format("'{}'", belief.robot.model.name),
+                   fmt::format("the robot '{}' of scene '{}'", execution.robot.model.name, execution.name));
+  }
+  const auto names = [](const Scene& scene) {
+    std::vector<std::string> result;
+    for (const SceneObject& object : scene.objects) result.push_back(object.name);
+    return result;
+  };
+  if (names(belief) == names(execution)) return {};
+  return invalid("objects", fmt::format("{}", fmt::join(names(belief), ", ")),
+                 fmt::format("those of scene '{}' in its order: {}", execution.name, fmt::join(names(execution), ", ")));
 }
 
 }  // namespace jostle::physics_pool

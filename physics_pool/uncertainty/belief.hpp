@@ -30,4 +30,9 @@ enum class Measurement {
 /// above the surface as its believed shape puts it; joints are exact.
 State observed_state(const Scene& execution, const Scene& belief, const State& truth, Measurement measurement);
 
+/// A belief is of the same robot and of objects of the same names in the same order, whatever it says of their
+/// shapes and places.
+/// Error kInvalidArgument naming what differs.
+Result<void> check_belief(const Scene& execution, const Scene& belief);
+
 }  // namespace jostle::physics_pool

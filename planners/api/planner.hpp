@@ -22,6 +22,8 @@ struct Problem {
   ControlSequence initial;       ///< candidate to improve, at least one step
   std::vector<double> u_before;  ///< [nu] control before its first step; empty: at rest
   int iterations = 50;           ///< I_max
+  /// No iteration begins once so many rollouts are spent; the last one may go beyond it.
+  std::uint64_t rollouts = UINT64_MAX;
   std::uint64_t seed = 0;
   std::uint32_t stream = 0;                                           ///< first noise stream; one is used per iteration
   bool clear_hand = false;                                            ///< let Objective::obstruction count

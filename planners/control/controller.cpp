@@ -46,7 +46,7 @@ class Run {
   Run(const ControlSetup& setup, const ControlOptions& options, const OnEvent& on_event, std::stop_token stop)
       : setup_(setup),
         options_(options),
-        execution_(setup, options.step_duration, options.timeout, on_event, std::move(stop)),
+        execution_(setup, options.step_duration, on_event, std::move(stop)),
         replan_iterations_(options.few_iterations) {}
 
   Result<Outcome> go() {

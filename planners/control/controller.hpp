@@ -34,7 +34,6 @@ struct ControlOptions {
   int initial_steps = 6;                              ///< n of the straight line
   double straight_speed = 0.04;                       ///< m/s of the single straight step
   double step_duration = 1.0;                         ///< Delta_t, s
-  std::chrono::milliseconds timeout{15 * 60 * 1000};  ///< planning and acting together
   bool plan_only = false;                             ///< stop after the first plan
   bool close_hand = true;                             ///< close the fingers on the target at the end
 };

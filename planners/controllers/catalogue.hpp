@@ -17,7 +17,6 @@ struct ControllerOptions {
   MpcOptions mpc;
 
   void set_plan_only(bool plan_only) { control.plan_only = mpc.plan_only = plan_only; }
-  void set_timeout(std::chrono::milliseconds timeout) { control.timeout = mpc.timeout = timeout; }
 };
 
 /// One controller.

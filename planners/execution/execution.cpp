@@ -32,14 +32,14 @@ void Outcome::conclude(Ending how, std::string why) {
   reason = std::move(why);
 }
 
-Execution::Execution(const ControlSetup& setup, double step_duration, std::chrono::milliseconds timeout,
-                     const OnEvent& on_event, std::stop_token stop)
+Execution::Execution(const ControlSetup& setup, double step_duration, const OnEvent& on_event,
+                     std::stop_token stop)
     : setup_(setup),
       step_duration_(step_duration),
       on_event_(on_event),
       stop_(std::move(stop)),
       start_(Clock::now()),
-      deadline_(start_ + timeout) {}
+      deadline_(start_ + setup.limits.timeout) {}
 
 Result<void> Execution::observe() {
   auto robot_result = setup_.robot.read();
@@ -62,11 +62,15 @@ Result<void> Execution::plan(const ControlSequence& initial, int iterations, boo
                              std::vector<double> u_before) {
   notify(Phase::kPlanning);
   const auto before = Clock::now();
+  if (rollouts_left() == 0) return Error{Code::kDeadline, "task: out of rollouts"};
+  auto start_result = setup_.make_feasible ? setup_.make_feasible(x_) : Result<State>(x_);
+  if (!start_result) return start_result.error();
   Problem problem{.world = setup_.world,
-                  .x0 = setup_.make_feasible ? setup_.make_feasible(x_) : x_,
+                  .x0 = std::move(start_result).value(),
                   .initial = initial,
                   .u_before = std::move(u_before),
                   .iterations = iterations,
+                  .rollouts = rollouts_left(),
                   .seed = setup_.seed,
                   .stream = stream_,
                   .clear_hand = clear_hand,
@@ -108,10 +112,17 @@ Result<Outcome> Execution::end(const Result<void>& ended) {
   outcome_.total_time = Clock::now() - start_;
   if (!ended) {
     if (ended.error().code != Code::kDeadline) return ended.error();
-    outcome_.conclude(Ending::kTimedOut, fmt::format("timeout after {:.0f} s", outcome_.total_time.count()));
+    outcome_.conclude(Ending::kTimedOut, rollouts_left() == 0
+                                             ? fmt::format("all {} rollouts are spent", setup_.limits.rollouts)
+                                             : fmt::format("timeout after {:.0f} s", outcome_.total_time.count()));
   }
   notify(Phase::kDone);
   return std::move(outcome_);
+}
+
+std::uint64_t Execution::rollouts_left() const {
+  if (setup_.limits.rollouts == 0) return UINT64_MAX;
+  return setup_.limits.rollouts - std::min(setup_.limits.rollouts, outcome_.rollouts);
 }
 
 void Execution::notify(Phase phase) const {

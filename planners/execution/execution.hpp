@@ -19,6 +19,14 @@
 
 namespace jostle::planners {
 
+/// How long a run may go on, planning and acting together.
+struct RunLimits {
+  std::chrono::milliseconds timeout{15 * 60 * 1000};
+  /// Rollouts of all its plans; 0: as many as there is time for. A run that is limited by rollouts, rather than by time,
+  /// makes the same decisions however fast its machines are and whoever else uses them.
+  std::uint64_t rollouts = 0;
+};
+
 /// What a controller works with. Everything outlives the run.
 struct ControlSetup {
   Planner& planner;
@@ -29,7 +37,8 @@ struct ControlSetup {
   Hash world;
   std::uint64_t seed = 0;
   /// Makes an observed state one that physics can start from; may be empty.
-  std::function<State(const State&)> make_feasible;
+  std::function<Result<State>(const State&)> make_feasible;
+  RunLimits limits;
 };
 
 /// Phases of a run, for those who watch.
@@ -84,11 +93,10 @@ struct Outcome {
 /// has come of it so far.
 ///
 /// Threads  one.
-/// Time     kDeadline once the run has taken longer than its time.
+/// Time     kDeadline once the run has taken longer than its time, or needs a plan and has no rollouts left.
 class Execution {
  public:
-  Execution(const ControlSetup& setup, double step_duration, std::chrono::milliseconds timeout, const OnEvent& on_event,
-            std::stop_token stop);
+  Execution(const ControlSetup& setup, double step_duration, const OnEvent& on_event, std::stop_token stop);
 
   const StateLayout& layout() const { return setup_.geometry.layout; }
   const State& x() const { return x_; }                                 ///< newest observation
@@ -121,6 +129,8 @@ class Execution {
   void notify(Phase phase) const;
 
  private:
+  std::uint64_t rollouts_left() const;
+
   using Clock = std::chrono::steady_clock;
 
   const ControlSetup& setup_;

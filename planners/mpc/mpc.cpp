@@ -30,7 +30,7 @@ class Run {
   Run(const ControlSetup& setup, const MpcOptions& options, const OnEvent& on_event, std::stop_token stop)
       : setup_(setup),
         options_(options),
-        execution_(setup, options.step_duration, options.timeout, on_event, std::move(stop)) {}
+        execution_(setup, options.step_duration, on_event, std::move(stop)) {}
 
   Result<Outcome> go() { return execution_.end(push()); }
 

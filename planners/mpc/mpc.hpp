@@ -19,7 +19,6 @@ struct MpcOptions {
   int max_actions = 20;                               ///< the task has failed after so many (Sec. 6.3.3)
   double straight_speed = 0.1;                        ///< m/s, of the straight push, at most
   double step_duration = 1.0;                         ///< Delta_t, s
-  std::chrono::milliseconds timeout{15 * 60 * 1000};  ///< planning and acting together
   bool plan_only = false;                             ///< stop after the first plan
 };
 

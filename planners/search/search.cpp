@@ -35,7 +35,8 @@ Search::Search(physics_pool::Pool& pool, const Problem& problem, RolloutBatch pa
 RolloutBatch Search::around(const ControlSequence& nominal) const {
   RolloutBatch batch = pattern_;
   batch.nominal = nominal;
-  batch.law.stream = problem_.stream + static_cast<std::uint32_t>(best_.iterations);
+  batch.law.stream =
+      (problem_.stream + static_cast<std::uint32_t>(best_.iterations)) % physics_pool::kSamplingStreams;
   batch.incumbent = best_.cost;
   return batch;
 }
@@ -94,7 +95,7 @@ Result<void> Search::attempt(const std::function<Result<void>()>& step) {
 Result<Plan> Search::until_done(const std::function<Result<void>()>& improve) {
   if (auto ok = attempt([this] { return consider(problem_.initial); }); !ok) return ok.error();
   report();
-  while (best_.iterations < problem_.iterations && !best_.at_goal) {
+  while (best_.iterations < problem_.iterations && best_.rollouts < problem_.rollouts && !best_.at_goal) {
     if (auto ok = attempt(improve); !ok) return ok.error();
     ++best_.iterations;
     report();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <future>
 #include <latch>
+#include <set>
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/parareal/parareal_pool.hpp"
@@ -258,6 +259,53 @@ TEST_P(EnginePoolContract, StoppingTheHopelessNeverChangesTheWinner) {
   EXPECT_LT(engine_steps(reference(batch)), without);
 }
 
+TEST_P(PoolContract, NoiseIsTheSameEverywhereAndForEveryCandidate) {
+  RolloutBatch batch = push_batch(scene, 6);
+  batch.law.sigma.assign(batch.law.limit.size(), 0.0);  // samples differ in their noise alone
+  batch.stop_losers = false;
+  batch.want_all_trajectories = true;
+  batch.noise = {.sigma = 0.003, .slope = 0.02, .seed = 5};
+
+  const BatchReply reply = run(batch);
+
+  EXPECT_EQ(fingerprints(reply), fingerprints(reference(batch)));
+  const std::vector<Hash> all = fingerprints(reply);
+  EXPECT_EQ(std::set<Hash>(all.begin(), all.end()).size(), all.size());
+  RolloutBatch other = batch;
+  other.law.seed += 1;  // of the controls' noise, of which there is none
+  EXPECT_EQ(fingerprints(run(other)), all);
+  other.noise.seed += 1;
+  EXPECT_NE(fingerprints(run(other)), all);
+}
+
+TEST_P(PoolContract, SeveralBatchesAtOnceReplyAsEachWouldAlone) {
+  const Scene other = scene_of(2);
+  ASSERT_TRUE(sut.load(other));
+  std::vector<RolloutBatch> batches{push_batch(scene, 3), push_batch(other, 4), push_batch(scene, 1)};
+  for (RolloutBatch& batch : batches) batch.stop_losers = false;
+  batches[2].first_sample = 7;
+
+  const auto replies_result = sut.run_all(batches, in(kPatience));
+
+  ASSERT_TRUE(replies_result) << replies_result.error().message;
+  ASSERT_EQ(replies_result->size(), batches.size());
+  for (std::size_t i = 0; i < batches.size(); ++i) {
+    EXPECT_EQ(fingerprints((*replies_result)[i]), fingerprints(run(batches[i]))) << i;
+  }
+  EXPECT_TRUE(sut.run_all({}, in(kPatience))->empty());
+}
+
+TEST_P(PoolContract, OneBadBatchOfSeveralIsTheAnswer) {
+  std::vector<RolloutBatch> batches{push_batch(scene, 2), push_batch(scene, 2)};
+  batches[1].samples = 0;
+
+  const auto replies_result = sut.run_all(batches, in(kPatience));
+
+  ASSERT_FALSE(replies_result);
+  EXPECT_EQ(replies_result.error().code, Code::kInvalidArgument);
+  EXPECT_THAT(replies_result.error().message, HasSubstr("samples: got 0"));
+}
+
 TEST_P(PoolContract, UnknownWorldIsAnErrorThatNamesIt) {
   RolloutBatch batch = push_batch(scene, 1);
   batch.world = {.high = 0xabad1dea, .low = 7};
@@ -287,6 +335,10 @@ TEST_P(PoolContract, BadFieldIsNamed) {
       {"samples", [](RolloutBatch& b) { b.samples = 1'000'000'000; }},
       {"step_duration", [](RolloutBatch& b) { b.step_duration = 1e9; }},
       {"step_duration", [](RolloutBatch& b) { b.step_duration = 0.0301; }},
+      {"law.stream", [](RolloutBatch& b) { b.law.stream = kSamplingStreams; }},
+      {"noise.sigma", [](RolloutBatch& b) { b.noise.sigma = -1; }},
+      {"noise.slope", [&](RolloutBatch& b) { b.noise.slope = kNaN; }},
+      {"noise", [](RolloutBatch& b) { b.noise.sigma = 0.003, b.fidelity.freeze = true; }},
       {"incumbent", [&](RolloutBatch& b) { b.incumbent = kNaN; }},
       {"objective.edge", [](RolloutBatch& b) { b.objective["edge"].weight = -1; }},
       {"priority", [](RolloutBatch& b) { b.priority = static_cast<Priority>(7); }},

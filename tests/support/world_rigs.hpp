@@ -70,7 +70,7 @@ class InProcessRig final : public WorldRig {
   State truth() override { return world_.state(); }
 
  private:
-  physics_pool::ExecutionWorld world_{compiled(scene), 0.0, 0};
+  physics_pool::ExecutionWorld world_{compiled(scene)};
   world::SimulatedRobot robot_{world_};
   world::SimulatedObjects objects_{world_, scene};
 };
@@ -118,7 +118,7 @@ class ClientRig final : public WorldRig {
   wire::Inbox<jostle_msgs::msg::RobotStatus> statuses_{participant_, wire::topics::kRobotStatus, 64};
   world::RobotClient robot_{participant_, kPatient};
   world::ObjectsClient objects_{participant_, robot_, kPatient};
-  physics_pool::ExecutionWorld same_{compiled(scene), 0.0, 0};  // what the process does, done here
+  physics_pool::ExecutionWorld same_{compiled(scene)};  // what the process does, done here
 };
 
 /// services/bags/replay: the made-up recording of a robot that goes 1 cm ahead in every

@@ -35,7 +35,7 @@ Result<ReplayReport> replay(const RecordedRun& recorded, const ReplayOptions& op
   task::Task& task = *task_result;
   // The recording says how long it goes on; this machine may be slower.
   constexpr std::chrono::hours kForever{24 * 365};
-  task.parameters().controller.set_timeout(kForever);
+  task.parameters().limits.timeout = kForever;
 
   ReplayReport report{
       .recorded = recorded.run, .here = task::describe_run(goal), .changes = std::move(changes_result).value()};

@@ -75,6 +75,10 @@ int main(int argc, char** argv) {
                                 "2,3,6-8; without a list, one of those this process may use")
                      ->expected(0, 1)
                      ->type_name("[CORES]");
+  std::size_t megabytes = WorkerOptions::kMemory >> 20;
+  app.add_option("--memory", megabytes, "MB of worlds and simulators that are kept for the next batch")
+      ->capture_default_str()
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1} << 20));
   app.add_option("--name", options.name, "As clients report it (default: host and process id)");
   common::add_process_options(app, process);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
@@ -85,6 +89,7 @@ int main(int argc, char** argv) {
       return common::kExitUsage;
     }
   }
+  options.memory = megabytes << 20;
   common::die_with_parent(process.parent);
   dds_options.domain = process.domain;
   const common::StopSignal signal;

@@ -63,7 +63,7 @@ WorkerService::WorkerService(const wire::Participant& participant, const WorkerO
       threads_(std::max(options.threads, 1)),
       result_writer_(participant, wire::topics::kPoolResult),
       heartbeat_writer_(participant, wire::topics::kPoolWorker),
-      executor_(threads_, options.cores),
+      executor_(threads_, options.cores, (options.memory - options.memory / 4) / static_cast<std::size_t>(threads_)),
       world_reader_(participant, wire::topics::kPoolWorld,
                     [this](const msg::WorldDescription& world) {
                       worlds_.announce({.high = world.high(), .low = world.low()}, world.scene());

@@ -24,6 +24,11 @@ struct WorkerOptions {
   std::string name;        ///< as clients report it; empty: host and process id
   int threads = 1;         ///< rollouts at a time; one per core is enough
   std::vector<int> cores;  ///< of each simulating thread; empty: wherever the system likes
+  /// Bytes of worlds and simulators that are kept for the next batch: a quarter of them worlds. A client that plans
+  /// in many worlds at once needs room for all of them in every thread.
+  std::size_t memory = kMemory;
+
+  static constexpr std::size_t kMemory = std::size_t{512} << 20;
 };
 
 /// Takes assignments, runs their samples, answers each. Clients and priorities share the

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "physics_pool/scene/scene.hpp"
 
@@ -13,7 +14,6 @@ using physics_pool::WorldPtr;
 
 namespace {
 
-constexpr std::size_t kWorlds = 8;    // compiled ones, about a megabyte each
 constexpr std::size_t kTexts = 4096;  // a few kilobytes each
 
 Error refused(const Hash& hash, const std::string& why) {
@@ -69,22 +69,24 @@ void WorldStore::keep(const Hash& hash, const Result<WorldPtr>& world_result) {
   if (found == entries_.end()) return;  // dropped meanwhile
   if (world_result) {
     found->second.world = *world_result;
-    drop_oldest_world();
+    drop_oldest_worlds();
   } else {
     found->second.refusal = world_result.error();
     fmt::print(stderr, "refused: {}\n", world_result.error().message);
   }
 }
 
-void WorldStore::drop_oldest_world() {
-  Entry* oldest = nullptr;
-  std::size_t kept = 0;
+void WorldStore::drop_oldest_worlds() {
+  std::vector<Entry*> compiled;
   for (auto& [hash, entry] : entries_) {
-    if (!entry.world) continue;
-    ++kept;
-    if (!oldest || entry.used < oldest->used) oldest = &entry;
+    if (entry.world) compiled.push_back(&entry);
   }
-  if (kept > kWorlds) oldest->world.reset();
+  std::ranges::sort(compiled, std::greater(), [](const Entry* entry) { return entry->used; });
+  std::size_t sum = 0;
+  for (std::size_t i = 0; i < compiled.size(); ++i) {
+    sum += compiled[i]->world->bytes();
+    if (i > 0 && sum > bytes_) compiled[i]->world.reset();
+  }
 }
 
 void WorldStore::drop_oldest_text() {

@@ -2,6 +2,7 @@
 /// \file
 /// WorldStore: a worker's worlds, as text until they are needed.
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <mutex>
@@ -18,6 +19,9 @@ namespace jostle::pool {
 ///          never waits for it.
 class WorldStore {
  public:
+  /// `bytes`: of compiled worlds that are kept; the newest always is.
+  explicit WorldStore(std::size_t bytes) : bytes_(bytes) {}
+
   /// Keeps a text under the name its sender gave it. Cheap. A text with another
   /// hash is refused, unless the right one is already here.
   void announce(const Hash& hash, std::string scene);
@@ -39,10 +43,11 @@ class WorldStore {
   };
 
   void keep(const Hash& hash, const Result<physics_pool::WorldPtr>& world_result);
-  void drop_oldest_world();
+  void drop_oldest_worlds();
   void drop_oldest_text();
 
-  mutable std::mutex mutex_;  // guards everything
+  const std::size_t bytes_;
+  mutable std::mutex mutex_;  // guards everything below
   std::map<Hash, Entry> entries_;
   std::uint64_t clock_ = 0;  // counts uses
 };

@@ -17,8 +17,8 @@
 
 #include "services/common/charts/statistics.hpp"
 #include "services/common/lab/hosts.hpp"
-#include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
+#include "services/common/results/results.hpp"
 #include "services/studies/bench/chaos_schedule.hpp"
 #include "services/studies/bench/plan_again.hpp"
 #include "services/studies/bench/swarm.hpp"
@@ -276,7 +276,7 @@ void print(const Report& report, const ChaosOptions& options) {
              to_string(report.hash));
 }
 
-std::string to_json(const Report& report, const ChaosOptions& options) {
+nlohmann::json to_json(const Report& report, const ChaosOptions& options) {
   nlohmann::json faults = nlohmann::json::object();
   for (const Fault::Kind kind : kKinds) faults[to_string(kind)] = report.count(kind);
   const nlohmann::json object{{"name", "chaos"},
@@ -292,7 +292,7 @@ std::string to_json(const Report& report, const ChaosOptions& options) {
                               {"returned_s", report.returned},
                               {"reissued", report.pool.reissued},
                               {"duplicates", report.pool.duplicates}};
-  return object.dump(2) + "\n";
+  return object;
 }
 
 }  // namespace
@@ -308,7 +308,7 @@ Result<bool> bench_chaos(const ChaosOptions& options) {
   const Report& report = **result;
   print(report, options);
   if (!options.json.empty()) {
-    if (auto ok = common::write_text(options.json, to_json(report, options)); !ok) return ok.error();
+    if (auto ok = common::write_results(options.json, to_json(report, options)); !ok) return ok.error();
   }
   return report.unequal == 0;
 }

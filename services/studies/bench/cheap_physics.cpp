@@ -15,6 +15,7 @@
 #include "physics_pool/objective/scorer.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "services/common/process/files.hpp"
+#include "services/common/results/results.hpp"
 #include "services/task/config/parameters.hpp"
 
 namespace jostle::studies {
@@ -152,7 +153,7 @@ double correlation(const std::vector<RolloutOutcome>& a, const std::vector<Rollo
 // Whether the plan, executed without looking, brings the full world's target into
 // the hand and drops nothing.
 bool succeeds(const Task& task, const Plan& plan, const planners::PbstoOptions& options) {
-  physics_pool::ExecutionWorld world(task.world, 0.0, 0);
+  physics_pool::ExecutionWorld world(task.world);
   const long steps = std::lround(options.step_duration / task.world->time_step());
   for (int t = 0; t < plan.controls.steps(); ++t) {
     world.begin(plan.controls.step(t));
@@ -472,7 +473,7 @@ Result<void> bench_cheap_physics(CheapPhysicsOptions options, const CheapPhysics
   fmt::print("{}", to_text(*results));
   nlohmann::json json = to_json(*results);
   const auto save = [&] {
-    return files.json.empty() ? Result<void>{} : common::write_text(files.json, json.dump(1) + "\n");
+    return files.json.empty() ? Result<void>{} : common::write_results(files.json, json);
   };
   if (auto ok = save(); !ok) return ok;  // before the peers: half of an hour is worth keeping
   if (std::ranges::find(options.parts, "peers") == options.parts.end()) return {};

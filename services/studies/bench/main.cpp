@@ -11,6 +11,7 @@
 #include "services/common/process/domain_claim.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
+#include "services/common/results/results.hpp"
 #include "services/studies/bench/benchmarks.hpp"
 #include "services/studies/bench/chaos.hpp"
 #include "services/studies/bench/cheap_physics.hpp"
@@ -71,7 +72,7 @@ int perform(const Benchmark& benchmark, Settings settings, const std::string& js
   if (!result) return fail(result.error(), common::kExitBroken);
   for (const Measurement& measurement : *result) fmt::print("{}", to_text(measurement));
   if (!json.empty()) {
-    if (auto ok = common::write_text(json, to_json(*result)); !ok) return fail(ok.error(), common::kExitBroken);
+    if (auto ok = common::write_results(json, to_json(*result)); !ok) return fail(ok.error(), common::kExitBroken);
   }
   const bool agree = std::ranges::all_of(*result, &Measurement::agrees);
   return agree ? common::kExitOk : common::kExitFailed;

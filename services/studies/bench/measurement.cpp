@@ -119,10 +119,10 @@ std::string to_text(const Measurement& measurement) {
   return text + "\n";
 }
 
-std::string to_json(const std::vector<Measurement>& measurements) {
+nlohmann::json to_json(const std::vector<Measurement>& measurements) {
   nlohmann::json list = nlohmann::json::array();
   for (const Measurement& measurement : measurements) list.push_back(to_object(measurement));
-  return list.dump(2) + "\n";
+  return list;
 }
 
 }  // namespace jostle::studies

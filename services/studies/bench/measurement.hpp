@@ -75,6 +75,6 @@ std::string to_text(const Measurement& measurement);
 
 /// For scripts: a list of objects with name, ratio, interval, samples, a, b,
 /// unit, hash_a, hash_b, aim and more.
-std::string to_json(const std::vector<Measurement>& measurements);
+nlohmann::json to_json(const std::vector<Measurement>& measurements);
 
 }  // namespace jostle::studies

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "services/common/charts/lanes.hpp"
-#include "services/common/process/files.hpp"
+#include "services/common/results/results.hpp"
 #include "services/pool/client/timeline.hpp"
 #include "services/studies/bench/benchmarks.hpp"
 #include "services/studies/bench/swarm.hpp"
@@ -157,7 +157,7 @@ void print(const pool::Timeline& timeline, const std::string& title) {
       milliseconds(timeline.on_the_way), milliseconds(timeline.in_line), milliseconds(timeline.clock_error));
 }
 
-std::string to_json(const pool::Timeline& timeline, const Legend& legend, const PoolTimelineOptions& options) {
+nlohmann::json to_json(const pool::Timeline& timeline, const Legend& legend, const PoolTimelineOptions& options) {
   nlohmann::json object{{"workers", options.workers},
                         {"clients", options.clients},
                         {"batches", options.batches},
@@ -184,7 +184,7 @@ std::string to_json(const pool::Timeline& timeline, const Legend& legend, const 
                               {"series", legend.of.at({bar.client, bar.epoch})},
                               {"first", bar.first}});
   }
-  return object.dump(2) + "\n";
+  return object;
 }
 
 }  // namespace
@@ -236,7 +236,7 @@ Result<void> bench_pool(const PoolTimelineOptions& options) {
     if (auto ok = common::draw(options.picture, chart_of(timeline, legend, title)); !ok) return ok;
   }
   if (options.json.empty()) return {};
-  return common::write_text(options.json, to_json(timeline, legend, options));
+  return common::write_results(options.json, to_json(timeline, legend, options));
 }
 
 }  // namespace jostle::studies

@@ -22,6 +22,7 @@
 #include "services/common/process/child_process.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
+#include "services/common/results/results.hpp"
 #include "services/studies/bench/measurement.hpp"
 #include "services/studies/bench/workload.hpp"
 #include "services/wire/dds/names.hpp"
@@ -345,7 +346,7 @@ Result<void> measure(const RecordBenchOptions& options, const fs::path& folder) 
     all[key] = *loop_result;
   }
   print(all);
-  if (!options.json.empty()) return common::write_text(options.json, all.dump(2) + "\n");
+  if (!options.json.empty()) return common::write_results(options.json, all);
   return {};
 }
 

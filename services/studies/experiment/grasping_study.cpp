@@ -67,7 +67,7 @@ Result<planners::Outcome> grasp(const GraspingStudy& study, const GraspingRun& r
                                              .seed = run.seed},
                                             pool);
   if (!run_result) return run_result.error();
-  physics_pool::ExecutionWorld world(*truth_result, physics_pool::velocity_noise(level), run.seed);
+  physics_pool::ExecutionWorld world(*truth_result, {.sigma = physics_pool::velocity_noise(level), .seed = run.seed});
   world::SimulatedRobot robot(world);
   world::SimulatedObjects objects(world, belief);
   auto outcome_result = run_result->perform(robot, objects, {}, stop);
@@ -151,7 +151,7 @@ class GraspingStudyRunner final : public Study {
     if (options.seeds) std::tie(study.first_seed, study.last_seed) = *options.seeds;
     if (!options.levels.empty()) study.levels = options.levels;
     if (!options.controllers.empty()) study.controllers = options.controllers;
-    if (options.timeout) study.parameters.controller.set_timeout(*options.timeout);
+    if (options.timeout) study.parameters.limits.timeout = *options.timeout;
     if (auto ok = check(study, "--"); !ok) return ok.error();
     const auto total = study.levels.size() * study.controllers.size() * (study.last_seed - study.first_seed + 1);
     std::size_t done = 0;

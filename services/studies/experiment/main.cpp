@@ -9,8 +9,8 @@
 #include <optional>
 #include <thread>
 
-#include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
+#include "services/common/results/results.hpp"
 #include "services/studies/experiment/study.hpp"
 
 namespace {
@@ -77,10 +77,13 @@ int main(int argc, char** argv) {
 
   auto report_result = (*study_result)->run(options);
   if (!report_result) return fail(report_result.error());
-  const StudyReport& report = *report_result;
+  StudyReport& report = *report_result;
   fmt::print("{}", report.table);
   if (!json.empty()) {
-    if (auto ok = common::write_text(json, report.json.dump(1) + "\n"); !ok) return fail(ok.error());
+    auto files_result = study_files(name);
+    if (!files_result) return fail(files_result.error());
+    report.json["files"] = *files_result;
+    if (auto ok = common::write_results(json, report.json); !ok) return fail(ok.error());
   }
   if (!picture.empty()) {
     if (report.panels.empty()) {

@@ -42,7 +42,7 @@ Result<planners::Outcome> push(const PushStudy& study, const PushRun& run, std::
                                              .seed = run.seed},
                                             predictor_result->pool());
   if (!run_result) return run_result.error();
-  physics_pool::ExecutionWorld world(*truth_result, physics_pool::velocity_noise(study.reality), run.seed);
+  physics_pool::ExecutionWorld world(*truth_result, {.sigma = physics_pool::velocity_noise(study.reality), .seed = run.seed});
   world::SimulatedRobot robot(world);
   world::SimulatedObjects objects(world, belief);
   return run_result->perform(robot, objects, {}, stop);
@@ -153,7 +153,7 @@ class PushStudyRunner final : public Study {
     }
     PushStudy study = study_;
     if (options.seeds) std::tie(study.first_seed, study.last_seed) = *options.seeds;
-    if (options.timeout) study.parameters.controller.set_timeout(*options.timeout);
+    if (options.timeout) study.parameters.limits.timeout = *options.timeout;
     const std::size_t total = study.entries.size() * (study.last_seed - study.first_seed + 1);
     std::size_t done = 0;
     const auto runs = run_study(study, options, [&](const PushRun& run) {

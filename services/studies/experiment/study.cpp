@@ -44,6 +44,22 @@ Result<std::unique_ptr<Study>> load_study(const std::string& name) {
   });
 }
 
+Result<std::map<std::string, std::string>> study_files(const std::string& name) {
+  std::map<std::string, std::string> files;
+  const auto add = [&](const std::string& file) -> Result<void> {
+    auto text_result = common::read_text(common::data_file("experiments/" + file));
+    if (!text_result) return text_result.error();
+    files[file] = std::move(text_result).value();
+    return {};
+  };
+  const std::string own = name + ".yaml";
+  if (auto ok = add(own); !ok) return ok.error();
+  if (const YAML::Node parameters = YAML::Load(files[own])["parameters"]; parameters && parameters.IsScalar()) {
+    if (auto ok = add(parameters.Scalar()); !ok) return ok.error();
+  }
+  return files;
+}
+
 std::vector<std::pair<std::string, std::string>> list_studies() {
   std::vector<std::pair<std::string, std::string>> studies;
   std::error_code problem;

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -52,6 +53,10 @@ class Study {
 /// `name` such as "fig-3.5": a file of the data folder experiments/ with the key `study`.
 /// Errors   kNotFound  no such file; kInvalidArgument, naming file, line and field
 Result<std::unique_ptr<Study>> load_study(const std::string& name);
+
+/// The files that decide a study's numbers, by name: its own, and that of its parameters.
+/// Error kIo naming one that cannot be read.
+Result<std::map<std::string, std::string>> study_files(const std::string& name);
 
 /// Names and titles of all studies there are, by name.
 std::vector<std::pair<std::string, std::string>> list_studies();

@@ -63,6 +63,10 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("straight_speed", control.straight_speed);
     in.optional("close_hand", control.close_hand);
     in.optional("timeout", timeout);
+    int max_rollouts = 0;
+    in.optional("max_rollouts", max_rollouts);
+    if (max_rollouts < 0) in.refuse("max_rollouts", fmt::format("got {}, wanted 0, for no limit, or more", max_rollouts));
+    parameters.limits.rollouts = static_cast<std::uint64_t>(max_rollouts);
   });
   fields.section("mpc", false, [&](yaml::Fields& in) {
     in.optional("horizon", mpc.horizon);
@@ -139,10 +143,10 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
 
 Result<Parameters> parse_parameters(std::string_view text, const std::string& origin) {
   return yaml::parse<Parameters>(text, origin, [&](const YAML::Node& root) -> Result<Parameters> {
-    double timeout = std::chrono::duration<double>(ControlOptions{}.timeout).count();
+    double timeout = std::chrono::duration<double>(planners::RunLimits{}.timeout).count();
     Parameters parameters = read(root, origin, timeout);
     if (auto ok = check(parameters, timeout, origin); !ok) return ok.error();
-    parameters.controller.set_timeout(std::chrono::milliseconds(std::llround(timeout * 1e3)));
+    parameters.limits.timeout = std::chrono::milliseconds(std::llround(timeout * 1e3));
     return parameters;
   });
 }
@@ -155,7 +159,15 @@ Result<Parameters> load_parameters(const std::filesystem::path& file) {
 
 Result<void> check_fit(const Parameters& parameters, const physics_pool::Scene& scene) {
   const auto& axes = scene.robot.model.axes;
-  if (parameters.planner.sigma.size() == axes.size()) return {};
+  if (parameters.planner.sigma.size() == axes.size()) {
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      if (parameters.planner.limit[i] <= axes[i].limit) continue;
+      return invalid(fmt::format("parameters: planner.limit[{}]", i), fmt::format("{}", parameters.planner.limit[i]),
+                     fmt::format("at most {}, the limit of axis '{}' of the robot '{}'", axes[i].limit, axes[i].name,
+                                 scene.robot.model.name));
+    }
+    return {};
+  }
   std::vector<std::string> names;
   for (const physics_pool::Axis& axis : axes) names.push_back(axis.name);
   return invalid("parameters: planner.sigma", fmt::format("{} numbers", parameters.planner.sigma.size()),

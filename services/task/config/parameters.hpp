@@ -16,6 +16,7 @@ namespace jostle::task {
 struct Parameters {
   planners::PbstoOptions planner;
   planners::ControllerOptions controller;
+  planners::RunLimits limits;
 };
 
 /// Keys that a file leaves out keep their defaults; unknown keys are refused.

@@ -7,6 +7,7 @@
 #include "physics_pool/scene/task_kind.hpp"
 #include "services/common/process/child_process.hpp"
 #include "services/common/process/files.hpp"
+#include "services/common/results/results.hpp"
 
 namespace jostle::task {
 namespace {
@@ -77,13 +78,14 @@ Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::Goa
   report["pool"] = options.pool;
   report["workers"] = options.workers;
   report["scene"] = options.scene.name;
+  report["parameters"] = options.parameters;
   print_summary(report);
   if (!options.picture.empty()) {
     if (auto ok = draw(options, report); !ok) return ok;
     fmt::print("  picture      {}\n", options.picture.string());
   }
   if (!options.json.empty()) {
-    if (auto ok = common::write_text(options.json, report.dump(1) + "\n"); !ok) return ok;
+    if (auto ok = common::write_results(options.json, report); !ok) return ok;
     fmt::print("  numbers      {}\n", options.json.string());
   }
   return {};

@@ -1,5 +1,7 @@
 #include "services/task/session/composition.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include "physics_pool/local/simulator.hpp"
 
 namespace jostle::task {
@@ -32,11 +34,24 @@ Result<planners::Outcome> Composition::perform(robot_bridge::Robot& robot, perce
                                .geometry = geometry(),
                                .objective = parts_.parameters.planner.objective,
                                .world = world_,
-                               .seed = parts_.seed};
+                               .seed = parts_.seed,
+                               .limits = parts_.parameters.limits};
   if (!parts_.belief_is_exact) {
-    setup.make_feasible = [this](const State& x) { return physics_pool::separate(*believed_, x); };
+    setup.make_feasible = [this](const State& x) { return moved_apart(x); };
   }
   return controller_->run(setup, parts_.parameters.controller, watch.on_event, std::move(stop));
+}
+
+Result<State> Composition::moved_apart(const State& x) const {
+  constexpr double kDepth = 0.0005;  // m
+  auto result = physics_pool::separate(*believed_, x, kDepth);
+  if (!result) return result.error();
+  if (result->deepest > kDepth) {
+    spdlog::warn("what is measured does not fit the believed shapes: {:.1f} mm inside each other, wanted at most {:.1f}; "
+                 "planned from there all the same",
+                 1e3 * result->deepest, 1e3 * kDepth);
+  }
+  return std::move(result->x);
 }
 
 }  // namespace jostle::task

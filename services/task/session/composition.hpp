@@ -59,6 +59,8 @@ class Composition {
  private:
   Composition() = default;
 
+  Result<State> moved_apart(const State& x) const;
+
   RunParts parts_;
   const planners::ControllerKind* controller_ = nullptr;
   physics_pool::Pool* pool_ = nullptr;

@@ -1,34 +1,15 @@
 #include "services/task/session/task.hpp"
 
 #include <fmt/format.h>
-#include <sys/utsname.h>
 
 #include <chrono>
-#include <fstream>
 
 #include "physics_pool/local/handles.hpp"
+#include "services/common/results/results.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/world/link/messages.hpp"
 
 namespace jostle::task {
-namespace {
-
-// "x86_64, AMD EPYC 7B13": what floating-point results may depend on.
-std::string processor() {
-  utsname system{};
-  uname(&system);
-  std::ifstream in("/proc/cpuinfo");
-  for (std::string line; std::getline(in, line);) {
-    const auto colon = line.find(": ");
-    if (line.starts_with("model name") && colon != std::string::npos) {
-      return fmt::format("{}, {}", system.machine, line.substr(colon + 2));
-    }
-  }
-  return system.machine;
-}
-
-}  // namespace
-
 Task::Task(std::string goal_id, physics_pool::Scene execution, Predictor predictor, Composition run)
     : goal_id_(std::move(goal_id)),
       execution_(std::move(execution)),
@@ -78,10 +59,10 @@ jostle_msgs::msg::TaskRun describe_run(const jostle_msgs::msg::Goal& goal) {
   jostle_msgs::msg::TaskRun run;
   run.header(world::make_header(now.count(), ""));
   run.goal(goal);
-  run.build(fmt::format("Jostle {}, GCC {}, {}", JOSTLE_VERSION, __VERSION__, JOSTLE_BUILD_TYPE));
+  run.build(common::build());
   run.engine(fmt::format("MuJoCo {}", physics_pool::engine_version()));
   run.middleware(fmt::format("Fast DDS {}", wire::middleware_version()));
-  run.machine(processor());
+  run.machine(common::processor());
   return run;
 }
 

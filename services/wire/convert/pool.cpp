@@ -82,6 +82,9 @@ msg::BatchDescription to_wire(const RolloutBatch& batch) {
   wire.samples(batch.samples);
   wire.terms(to_wire(batch.objective.terms));
   wire.success_cost(batch.objective.success_cost);
+  wire.noise().sigma(batch.noise.sigma);
+  wire.noise().slope(batch.noise.slope);
+  wire.noise().seed(batch.noise.seed);
   wire.incumbent(batch.incumbent);
   wire.stop_losers(batch.stop_losers);
   wire.stop_hopeless(batch.stop_hopeless);
@@ -112,6 +115,7 @@ RolloutBatch from_wire(const msg::BatchDescription& wire) {
   batch.first_sample = wire.first_sample();
   batch.samples = wire.samples();
   batch.objective = {.terms = from_wire(wire.terms()), .success_cost = wire.success_cost()};
+  batch.noise = {.sigma = wire.noise().sigma(), .slope = wire.noise().slope(), .seed = wire.noise().seed()};
   batch.incumbent = wire.incumbent();
   batch.stop_losers = wire.stop_losers();
   batch.stop_hopeless = wire.stop_hopeless();

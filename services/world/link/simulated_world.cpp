@@ -24,8 +24,7 @@ constexpr std::size_t kCommandQueue = 64;
 SimulatedWorld::SimulatedWorld(const wire::Participant& participant, physics_pool::WorldPtr world,
                                const SimulatedWorldOptions& options)
     : options_(options),
-      world_(world, physics_pool::velocity_noise(options.level), options.seed),
-      belief_(physics_pool::perturb(world->scene(), options.level, options.seed)),
+      world_(world, options.noise),
       limits_(physics_pool::axis_limits(world->scene().robot.model)),
       still_(static_cast<std::size_t>(world->geometry().layout.nu), 0.0),
       joints_(participant, wire::topics::kJointStates),
@@ -152,7 +151,7 @@ void SimulatedWorld::publish() {
   const State& truth = world_.state();
   const double time = world_.time();
   const State seen =
-      physics_pool::observed_state(world_.world().scene(), belief_, truth,
+      physics_pool::observed_state(world_.world().scene(), options_.belief, truth,
                                    moved_ ? physics_pool::Measurement::kFeedback : physics_pool::Measurement::kInitial);
   const auto objects = to_message(object_readings(geometry.layout, seen), time);
   // States: when one is lost, the next one follows within kPublicationPeriod and says as much.

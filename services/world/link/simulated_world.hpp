@@ -9,7 +9,6 @@
 
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/scene/scene.hpp"
-#include "physics_pool/uncertainty/levels.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/reader.hpp"
 #include "services/wire/dds/topics.hpp"
@@ -18,8 +17,9 @@
 namespace jostle::world {
 
 struct SimulatedWorldOptions {
-  physics_pool::Uncertainty level = physics_pool::Uncertainty::kNone;
-  std::uint64_t seed = 0;
+  physics_pool::VelocityNoise noise;
+  /// The planner's scene, which the objects' first measurement agrees with, and whose heights it goes on believing.
+  physics_pool::Scene belief;
   /// World seconds per second while an action runs; 0 is as fast as possible.
   double rate = 0.0;
   /// Let the world go on between actions (the robot brakes and holds) instead
@@ -61,7 +61,6 @@ class SimulatedWorld {
 
   SimulatedWorldOptions options_;
   physics_pool::ExecutionWorld world_;
-  physics_pool::Scene belief_;
   std::vector<double> limits_;                             // of the axes, m/s or rad/s
   std::vector<double> still_;                              // the control that moves nothing
   std::deque<jostle_msgs::msg::VelocityCommand> waiting_;  // came while an action was at work

@@ -6,6 +6,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "physics_pool/uncertainty/belief.hpp"
+#include "physics_pool/uncertainty/levels.hpp"
 #include "services/common/process/domain_claim.hpp"
 #include "services/common/process/program.hpp"
 #include "services/world/link/simulated_world.hpp"
@@ -14,14 +16,18 @@ int main(int argc, char** argv) {
   using namespace jostle;
   using namespace jostle::world;
   CLI::App app("Simulates the world in which actions happen.", "jostle sim");
-  std::string scene_file, level = "none";
+  std::string scene_file, belief_file, level = "none";
+  std::uint64_t seed = 0;
   SimulatedWorldOptions options;
   wire::ParticipantOptions participant_options{.name = "jostle_sim"};
   common::ProcessOptions process;
   app.add_option("scene", scene_file, "Scene file")->required();
   app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")
       ->capture_default_str();
-  app.add_option("--seed", options.seed, "Of the noise")->capture_default_str();
+  app.add_option("--seed", seed, "Of the noise")->capture_default_str();
+  app.add_option("--belief", belief_file,
+                 "The planner's scene: where its objects are is what is measured first (default: drawn as\n"
+                 "`jostle scene perturb` does from --uncertainty and --seed)");
   app.add_option("--rate", options.rate, "World seconds per second; 0: as fast as possible")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
@@ -39,9 +45,19 @@ int main(int argc, char** argv) {
   };
   auto level_result = physics_pool::parse_uncertainty(level);
   if (!level_result) return fail(level_result.error(), common::kExitUsage);
-  options.level = *level_result;
   auto scene_result = physics_pool::load_scene(scene_file);
   if (!scene_result) return fail(scene_result.error(), common::kExitUsage);
+  options.noise = {.sigma = physics_pool::velocity_noise(*level_result), .seed = seed};
+  if (belief_file.empty()) {
+    options.belief = physics_pool::perturb(*scene_result, *level_result, seed);
+  } else {
+    auto belief_result = physics_pool::load_scene(belief_file);
+    if (!belief_result) return fail(belief_result.error(), common::kExitUsage);
+    options.belief = std::move(belief_result).value();
+    if (auto ok = physics_pool::check_belief(*scene_result, options.belief); !ok) {
+      return fail({ok.error().code, fmt::format("--belief: {}", ok.error().message)}, common::kExitUsage);
+    }
+  }
   auto world_result = physics_pool::World::compile(*scene_result);
   if (!world_result) return fail(world_result.error(), common::kExitUsage);
   auto participant_result = wire::Participant::open(participant_options);

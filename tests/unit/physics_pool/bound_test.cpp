@@ -7,8 +7,9 @@
 #include "physics_pool/local/rollout.hpp"
 #include "physics_pool/local/simulator.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
-#include "tests/support/scenes.hpp"
 #include "tests/support/costs.hpp"
+#include "tests/support/planar.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {
 namespace {

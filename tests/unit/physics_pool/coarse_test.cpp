@@ -213,10 +213,10 @@ TEST(MakeCoarseModel, SaysWhatItWants) {
               HasSubstr("got 'astrology', wanted kinematic, limit-surface, planar or learned:FILE"));
 
   Scene gripper = scene;
-  gripper.robot.model = "planar_gripper";
+  gripper.robot = planar_gripper();
   const auto wrong = make_coarse_model("planar", gripper);
   ASSERT_FALSE(wrong);
-  EXPECT_THAT(wrong.error().message, HasSubstr("robot.model: got 'planar_gripper', wanted pusher"));
+  EXPECT_THAT(wrong.error().message, HasSubstr("robot.model: got 'planar_gripper', wanted a disc"));
 }
 
 }  // namespace

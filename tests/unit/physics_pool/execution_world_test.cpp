@@ -31,7 +31,7 @@ State after(ExecutionWorld& sut, const std::vector<double>& u, int steps = kStep
 
 TEST(ExecutionWorld, EndsActionsBitEqualToThePlannersModelWithoutNoise) {
   const WorldPtr world = compiled();
-  ExecutionWorld sut(world, 0.0, 1);
+  ExecutionWorld sut(world);
   Simulator model(world);
   State x = initial_state(world->scene());
   EXPECT_EQ(sut.state(), x);
@@ -45,7 +45,7 @@ TEST(ExecutionWorld, EndsActionsBitEqualToThePlannersModelWithoutNoise) {
 TEST(ExecutionWorld, RepeatsForEqualSeedsAndDiffersForOthers) {
   const WorldPtr world = compiled();
   const std::vector<double> u{0.1, 0.1, 0.3, 0};
-  ExecutionWorld a(world, 0.003, 1), b(world, 0.003, 1), c(world, 0.003, 2);
+  ExecutionWorld a(world, {.sigma = 0.003, .seed = 1}), b(world, {.sigma = 0.003, .seed = 1}), c(world, {.sigma = 0.003, .seed = 2});
   const State x = after(a, u);
   EXPECT_EQ(after(b, u), x);
   EXPECT_NE(after(c, u), x);
@@ -60,7 +60,7 @@ TEST(ExecutionWorld, AddsVelocityNoiseOfTheGivenSigmaEveryStep) {
   constexpr int kRuns = 400;
   double square = 0;
   for (std::uint64_t seed = 0; seed < kRuns; ++seed) {
-    ExecutionWorld sut(world, kSigma, seed);
+    ExecutionWorld sut(world, {.sigma = kSigma, .seed = seed});
     (void)after(sut, {0, 0, 0, 0}, 1);
     square += std::pow(sut.state().v[kJointX], 2);
   }
@@ -69,7 +69,7 @@ TEST(ExecutionWorld, AddsVelocityNoiseOfTheGivenSigmaEveryStep) {
 
 TEST(ExecutionWorld, StaysNearTheQuietWorldWhenNoiseIsSmall) {
   const WorldPtr world = compiled();
-  ExecutionWorld quiet(world, 0.0, 1), noisy(world, 1e-6, 1);
+  ExecutionWorld quiet(world), noisy(world, 1e-6, 1);
   const State a = after(quiet, {0, 0, 0, 0}), b = after(noisy, {0, 0, 0, 0});
   EXPECT_NE(a, b);
   for (std::size_t i = 0; i < a.q.size(); ++i) EXPECT_NEAR(a.q[i], b.q[i], 1e-4);

@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-#include "physics_pool/objective/terms.hpp"
+#include "physics_pool/objective/scorer.hpp"
 
 namespace jostle::physics_pool {
 namespace {

@@ -7,9 +7,12 @@
 #include <set>
 #include <string>
 
+#include "tests/support/planar.hpp"
+
 namespace jostle::physics_pool {
 namespace {
 
+using namespace tests;
 using testing::HasSubstr;
 
 constexpr std::uint64_t kSeeds = 200;

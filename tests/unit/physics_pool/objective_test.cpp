@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "physics_pool/sampling/counter_rng.hpp"
@@ -54,8 +56,7 @@ class ObjectiveTerms : public testing::Test {
 };
 
 TEST_F(ObjectiveTerms, KnowTheSurfaceAndRestingHeights) {
-  EXPECT_DOUBLE_EQ(geometry.half_x, 0.3);
-  EXPECT_DOUBLE_EQ(geometry.half_y, 0.3);
+  EXPECT_EQ(geometry.surface, Surface::table(0.6, 0.6));
   EXPECT_THAT(geometry.rest_heights, testing::ElementsAre(0.019, 0.025, 0.019));
 }
 
@@ -151,10 +152,8 @@ TEST_F(ObjectiveTerms, EdgeCostIsZeroInsideTheSafeZoneHoweverFarTheMove) {
 }
 
 TEST_F(ObjectiveTerms, EdgeCostGrowsExponentiallyOutsideTheSafeZone) {
-  Objective gentle = objective;
-  gentle.edge_rate = 20;
-  gentle.edge_exponent_max = 100;
-  const double border = 0.3 - gentle.edge_margin;
+  const Objective gentle = objective_with({{"edge_rate", 20}, {"edge_exponent_max", 100}});
+  const double border = 0.3 - gentle.value("edge", "margin");
   const double sides[4][2]{{border + 0.01, 0}, {-border - 0.01, 0}, {0, border + 0.01}, {0, -border - 0.01}};
   for (const auto& side : sides) {
     State before = start, after = start;
@@ -215,7 +214,7 @@ class Grasped : public ObjectiveTerms {
     return at_goal(geometry, start, objective);
   }
   static constexpr double kEps = 1e-9;
-  static constexpr double kMiddle = (kHand.near + kHand.far) / 2;
+  const double kMiddle = (kHand.near + kHand.far) / 2;
 };
 
 TEST_F(Grasped, IsInsideTheBordersOfTheRegionOnly) {
@@ -272,8 +271,7 @@ TEST_F(ObjectiveTerms, ObstructionsAreOtherObjectsBetweenTheFingers) {
   EXPECT_EQ(put(-kEps, 0.0), 0);
   EXPECT_EQ(put(0.03, start.q[kJointLeft] + kEps), 0);
   EXPECT_EQ(put(0.03, -start.q[kJointRight] - kEps), 0);
-  Objective strict = objective;
-  strict.obstruction = 7;
+  const Objective strict = objective_with({{"obstruction", 7}});
   const double clear = tests::final_cost(geometry, strict, start);
   ASSERT_EQ(put(0.03, 0.0), 1);
   EXPECT_DOUBLE_EQ(tests::final_cost(geometry, strict, start), clear + 7);
@@ -316,13 +314,57 @@ TEST_F(ObjectiveTerms, AreNeverNegativeOrInfiniteForRandomStates) {
 }
 
 TEST(Objective, DefaultsPassTheirOwnChecks) {
-  const Objective o;
-  for (const double weight :
-       {o.goal, o.angle, o.acceleration, o.disturbance, o.disturbance_rotation, o.edge, o.edge_rate,
-        o.edge_exponent_max, o.edge_margin, o.topple, o.topple_angle, o.drop, o.drop_height, o.success_cost}) {
-    EXPECT_GE(weight, 0.0);
-    EXPECT_TRUE(std::isfinite(weight));
-  }
+  const auto ok = validate(Objective::standard());
+  EXPECT_TRUE(ok) << ok.error().message;
+}
+
+TEST(Objective, IsTheSameInAnotherOrder) {
+  Objective turned = Objective::standard();
+  std::ranges::reverse(turned.terms);
+  const Scene scene = tests::three_objects();
+  const TaskGeometry geometry(scene);
+  const State x = initial_state(scene);
+  State y = x;
+  y.q[5] += 0.011, y.q[12] += 0.017, y.q[19] -= 0.29;
+  const std::vector<double> u0(4, 0.0), u1{0.1, 0.07, 0.013, 0.0};
+  EXPECT_EQ(tests::running_cost(geometry, turned, u0, u1, x, y),
+            tests::running_cost(geometry, Objective::standard(), u0, u1, x, y));
+}
+
+TEST(Objective, GivesDefaultsForTermsThatItLacks) {
+  Objective sut;
+  EXPECT_EQ(sut.weight("edge"), 0.0);
+  EXPECT_EQ(sut.value("edge", "rate"), Objective::standard().value("edge", "rate"));
+  sut["edge"].weight = 2;
+  EXPECT_EQ(sut.weight("edge"), 2);
+  EXPECT_EQ(sut.find("edge")->values, Objective::standard().find("edge")->values);
+  EXPECT_EQ(sut.terms.size(), 1u);
+}
+
+TEST(ValidateObjective, NamesWhatIsWrong) {
+  const auto told = [](const std::function<void(Objective&)>& spoil) {
+    Objective objective = Objective::standard();
+    spoil(objective);
+    const auto ok = validate(objective);
+    return ok ? std::string() : ok.error().message;
+  };
+  EXPECT_THAT(told([](Objective& o) { o.terms.push_back({.kind = "charm"}); }),
+              testing::AllOf(testing::HasSubstr("got 'charm'"), testing::HasSubstr("obstruction")));
+  EXPECT_THAT(told([](Objective& o) { o.terms.push_back(o.terms[0]); }), testing::HasSubstr("it twice"));
+  EXPECT_THAT(told([](Objective& o) { o["edge"].values.pop_back(); }), testing::HasSubstr("got 2 parameters, wanted 3"));
+  EXPECT_THAT(told([](Objective& o) { o.value("topple", "angle") = 4; }),
+              testing::AllOf(testing::HasSubstr("objective.topple_angle: got 4 rad"), testing::HasSubstr("<= 3.142")));
+}
+
+// What an arm does to a shelf is a fact of contact, which no state tells (Eq. 4.36).
+TEST_F(ObjectiveTerms, ContactCountsStepsThatHitAFixture) {
+  Objective objective;
+  objective["contact"].weight = 3;
+  const std::vector<double> u(4, 0.0);
+  Step step{.geometry = geometry, .u_before = u, .u = u, .x0 = start, .x1 = start};
+  EXPECT_EQ(Scorer(objective).running(step), 0.0);
+  step.facts.robot_hit_fixture = true;
+  EXPECT_EQ(Scorer(objective).running(step), 3.0);
 }
 
 }  // namespace

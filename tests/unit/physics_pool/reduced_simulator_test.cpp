@@ -188,7 +188,7 @@ TEST(StandsStill, OnlyOnTheSurfaceUprightAndAtRest) {
   EXPECT_FALSE(after([&](State& x) { x.v[v + 4] = -0.1; }));
   EXPECT_FALSE(after([&](State& x) { x.q[q + 2] += 0.01; }));
   EXPECT_FALSE(after([&](State& x) { x.q[q + 3] = std::cos(0.05), x.q[q + 4] = std::sin(0.05); }));
-  EXPECT_FALSE(after([&](State& x) { x.q[q + 1] = geometry.half_y + 0.001; }));
+  EXPECT_FALSE(after([&](State& x) { x.q[q + 1] = geometry.surface.parts[0].high_y() + 0.001; }));
   EXPECT_TRUE(after([&](State& x) { x.q[q + 3] = std::cos(0.7), x.q[q + 6] = std::sin(0.7); }));  // a turn about z
 }
 

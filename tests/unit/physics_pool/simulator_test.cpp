@@ -316,7 +316,7 @@ TEST(Separate, LeavesObjectsThatDoNotOverlapWhereTheyAre) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const WorldPtr world = compiled(*generate_chapter3({.objects = 15, .seed = seed}));
     const State x = initial_state(world->scene());
-    const State y = separate(*world, x);
+    const State y = separate(*world, x)->x;
     for (std::size_t i = 0; i < x.q.size(); ++i) EXPECT_NEAR(y.q[i], x.q[i], 1e-15);
   }
 }
@@ -328,7 +328,7 @@ TEST(Separate, ResolvesAnOverlapOf5Millimetres) {
   State x = initial_state(scene);
   Object second = object(*world, x, 1);
   second.p[0] = 0.035;  // two boxes of 40 mm
-  State y = separate(*world, x);
+  State y = separate(*world, x)->x;
   const double apart = object(*world, y, 1).p[0] - object(*world, y, 0).p[0];
   // Its own depth of 0.5 mm, which the engine reports of parallel boxes 1 mm deep.
   EXPECT_GT(apart, 0.04 - 0.0011);
@@ -339,12 +339,31 @@ TEST(Separate, ResolvesAnOverlapOf5Millimetres) {
   EXPECT_EQ(toppled_objects(world->geometry(), y, 0.1), 0);
 }
 
+TEST(Separate, SaysWhatItCouldNotMoveApart) {
+  Scene scene = tests::target_only();
+  scene.objects.push_back(tests::box("second", 0.1, 0));
+  const WorldPtr world = compiled(scene);
+  State x = initial_state(scene);
+  object(*world, x, 1).p[0] = 0.01;
+  EXPECT_GT(separate(*world, x, 0.0005, 2)->deepest, 0.01);
+  EXPECT_LE(separate(*world, x)->deepest, 0.0005);
+}
+
+TEST(Separate, IsAnErrorWhereTheEngineDiverges) {
+  const WorldPtr world = compiled(tests::three_objects());
+  State x = initial_state(world->scene());
+  object(*world, x, 1).p[2] = std::nan("");
+  const auto result = separate(*world, x);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Code::kInternal);
+}
+
 TEST(Separate, LeavesTheRobotInPlaceWhenAnObjectIsInsideIt) {
   const Scene scene = tests::target_only();
   const WorldPtr world = compiled(scene);
   State x = initial_state(scene);
   object(*world, x, 0).p[0] = scene.robot.q[0] + 0.015;  // 5 mm inside the palm
-  State y = separate(*world, x);
+  State y = separate(*world, x)->x;
   for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(y.q[i], x.q[i]);
   EXPECT_GT(object(*world, y, 0).p[0], scene.robot.q[0] + 0.02 - 0.0006);
 }

@@ -124,7 +124,7 @@ TEST_P(EitherController, ReportsATimeoutOfThePlannerAsAnOutcome) {
 }
 
 TEST_P(EitherController, ReportsATimeoutBeforeAnActionAsAnOutcome) {
-  options.timeout = std::chrono::milliseconds(0);
+  setup.limits.timeout = std::chrono::milliseconds(0);
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
   EXPECT_EQ(result.ending, Ending::kTimedOut);
@@ -132,14 +132,26 @@ TEST_P(EitherController, ReportsATimeoutBeforeAnActionAsAnOutcome) {
   EXPECT_THAT(robot.executed, testing::IsEmpty());
 }
 
+TEST_P(EitherController, EndsWhenItsRolloutsAreSpent) {
+  setup.limits.rollouts = 25;
+  planner.predicts_goal = false;
+  planner.change = [](Plan& plan, int) { plan.rollouts = 10; };
+  const Outcome result = outcome();
+  EXPECT_EQ(result.ending, Ending::kTimedOut);
+  EXPECT_EQ(result.reason, "all 25 rollouts are spent");
+  std::vector<std::uint64_t> left;
+  for (const Problem& problem : planner.problems) left.push_back(problem.rollouts);
+  EXPECT_THAT(left, testing::ElementsAre(25, 15, 5));
+}
+
 TEST_P(EitherController, GivesThePlannerTheDeadlineOfTheWholeTask) {
-  options.timeout = std::chrono::hours(3);
+  setup.limits.timeout = std::chrono::hours(3);
   const auto before = std::chrono::steady_clock::now();
   (void)outcome();
   const auto after = std::chrono::steady_clock::now();
   for (const auto deadline : planner.deadlines) {
-    EXPECT_GE(deadline, before + options.timeout);
-    EXPECT_LE(deadline, after + options.timeout);
+    EXPECT_GE(deadline, before + setup.limits.timeout);
+    EXPECT_LE(deadline, after + setup.limits.timeout);
   }
 }
 

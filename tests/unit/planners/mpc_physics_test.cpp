@@ -4,6 +4,7 @@
 
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/local/thread_pool.hpp"
+#include "physics_pool/objective/scorer.hpp"
 #include "physics_pool/scenarios/push.hpp"
 #include "planners/mpc/mpc.hpp"
 #include "services/world/in_process/in_process_world.hpp"
@@ -19,7 +20,7 @@ Outcome pushed(const Scene& scene, const MpcOptions& options) {
   ThreadPool pool(2);
   const PbstoOptions planner_options = push_planner_options();
   Pbsto planner(pool, planner_options);
-  ExecutionWorld truth(world, 0.0, 1);
+  ExecutionWorld truth(world);
   world::SimulatedRobot robot(truth);
   world::SimulatedObjects objects(truth, scene);
   const ControlSetup setup{.planner = planner,

@@ -247,7 +247,7 @@ TEST_F(MpcTest, ReportsATimeoutAsAnOutcome) {
   EXPECT_EQ(outcome().ending, Ending::kTimedOut);
   EXPECT_THAT(outcome().reason, HasSubstr("timeout"));
   planner.error.reset();
-  options.timeout = std::chrono::milliseconds(0);
+  setup.limits.timeout = std::chrono::milliseconds(0);
   EXPECT_EQ(outcome().ending, Ending::kTimedOut);
   EXPECT_THAT(robot.executed, testing::IsEmpty());
 }

@@ -63,7 +63,7 @@ class Replay : public testing::Test {
     physics_pool::ThreadPool pool(1);
     task::Task task = std::move(task::Task::prepare(goal, pool)).value();
     auto world = physics_pool::World::compile(task.execution_scene()).value();
-    physics_pool::ExecutionWorld execution(world, 0.0, kSeed);
+    physics_pool::ExecutionWorld execution(world);
     world::SimulatedRobot robot(execution);
     world::SimulatedObjects objects(execution, task.execution_scene());
     const task::Task::Watch watch{

@@ -107,7 +107,7 @@ TEST(ToJson, HoldsWhatScriptsRead) {
   result->unit = "s";
   result->aim = Aim{Aim::Kind::kAtMost, 1.2};
   result->details = {{"workers", 4.0}};
-  const auto list = nlohmann::json::parse(to_json({*result}));
+  const auto list = to_json({*result});
   ASSERT_EQ(list.size(), 1u);
   const auto& object = list[0];
   EXPECT_EQ(object["name"], "thing");

@@ -37,7 +37,7 @@ TEST(Parameters, KeepDefaultsOfWhatTheFileLeavesOut) {
   EXPECT_EQ(sut.planner.objective.success_cost, wanted.planner.objective.success_cost);
   EXPECT_EQ(sut.controller.control.many_iterations, wanted.controller.control.many_iterations);
   EXPECT_EQ(sut.controller.control.deviation_threshold, wanted.controller.control.deviation_threshold);
-  EXPECT_EQ(sut.controller.control.timeout, wanted.controller.control.timeout);
+  EXPECT_EQ(sut.limits.timeout, wanted.limits.timeout);
   EXPECT_EQ(sut.controller.control.close_hand, wanted.controller.control.close_hand);
 }
 
@@ -69,7 +69,7 @@ objective: {goal: 10, angle: 11, acceleration: 12, disturbance: 13, disturbance_
             obstacle_target: 25, obstacle_pusher: 26, obstacle_nearest: 27, intrusion: 28, collision: 29}
 control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, initial_steps: 27, straight_speed: 0.28,
           few_iterations_max: 30, obstruction_patience: 31,
-          timeout: 29.5, close_hand: false}
+          timeout: 29.5, max_rollouts: 37, close_hand: false}
 mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straight_speed: 0.36}
 )");
   EXPECT_EQ(sut.planner.step_duration, 0.5);
@@ -115,7 +115,7 @@ mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straig
   EXPECT_EQ(sut.controller.control.straight_speed, 0.28);
   EXPECT_EQ(sut.controller.control.few_iterations_max, 30);
   EXPECT_EQ(sut.controller.control.obstruction_patience, 31);
-  EXPECT_EQ(sut.controller.control.timeout, std::chrono::milliseconds(29500));
+  EXPECT_EQ(sut.limits.timeout, std::chrono::milliseconds(29500));
   EXPECT_FALSE(sut.controller.control.close_hand);
   EXPECT_EQ(sut.controller.mpc.horizon, 32);
   EXPECT_EQ(sut.controller.mpc.first_iterations, 33);
@@ -123,7 +123,7 @@ mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straig
   EXPECT_EQ(sut.controller.mpc.max_actions, 35);
   EXPECT_EQ(sut.controller.mpc.straight_speed, 0.36);
   EXPECT_EQ(sut.controller.mpc.step_duration, 0.5);
-  EXPECT_EQ(sut.controller.mpc.timeout, std::chrono::milliseconds(29500));
+  EXPECT_EQ(sut.limits.rollouts, 37u);
 }
 
 // experiments/pushing.yaml says what the code's defaults of pushing are.
@@ -146,7 +146,7 @@ TEST(Parameters, OfPushingAreThoseOfTheCode) {
   EXPECT_EQ(mpc.iterations, defaults.iterations);
   EXPECT_EQ(mpc.max_actions, defaults.max_actions);
   EXPECT_EQ(mpc.straight_speed, defaults.straight_speed);
-  EXPECT_EQ(mpc.timeout, defaults.timeout);
+  EXPECT_EQ(result->limits.timeout, planners::RunLimits{}.timeout);
 }
 
 struct Case {
@@ -189,6 +189,7 @@ const std::vector<Case> kCases{
     {"NoActions", "mpc: {max_actions: 0}\n", {"p.yaml", "mpc.max_actions", "got 0", "1 to"}},
     {"UnknownMpcKey", "mpc: {steps: 3}\n", {"p.yaml:1", "mpc.steps", "unknown key", "horizon"}},
     {"NaNTimeout", "control: {timeout: .nan}\n", {"p.yaml", "control.timeout", "nan", "1 to"}},
+    {"NegativeBudget", "control: {max_rollouts: -3}\n", {"p.yaml:1", "control.max_rollouts", "got -3", "no limit"}},
     {"NoSteps", "control: {initial_steps: 0}\n", {"p.yaml", "control.initial_steps", "got 0", "1 to"}},
     {"NoRollouts", "planner: {rollouts: 0}\n", {"p.yaml", "planner.rollouts", "got 0", "1 to"}},
     {"NotYaml", "planner: [\n", {"p.yaml:", "not YAML"}},

@@ -15,7 +15,7 @@ class InProcessWorld : public testing::Test {
  protected:
   physics_pool::Scene scene = tests::three_objects();
   physics_pool::WorldPtr world = std::move(physics_pool::World::compile(scene)).value();
-  physics_pool::ExecutionWorld execution{world, 0.0, 1};
+  physics_pool::ExecutionWorld execution{world};
 };
 
 TEST_F(InProcessWorld, RobotReadsItsJointsAndWhetherTheTargetIsInTheHand) {
@@ -30,14 +30,14 @@ TEST_F(InProcessWorld, RobotReadsItsJointsAndWhetherTheTargetIsInTheHand) {
 TEST_F(InProcessWorld, RobotFeelsTheTargetInTheHand) {
   scene.robot.q[0] = -0.035;
   world = std::move(physics_pool::World::compile(scene)).value();
-  physics_pool::ExecutionWorld near(world, 0.0, 1);
+  physics_pool::ExecutionWorld near(world);
   SimulatedRobot sut(near);
   EXPECT_EQ(sut.read()->object_in_hand, std::optional(true));
 }
 
 TEST(InProcessPush, PusherHasTwoJointsAndFeelsNothing) {
   const physics_pool::Scene scene = tests::push_ahead();
-  physics_pool::ExecutionWorld execution(std::move(physics_pool::World::compile(scene)).value(), 0.0, 1);
+  physics_pool::ExecutionWorld execution(std::move(physics_pool::World::compile(scene)).value());
   SimulatedRobot sut(execution);
   const auto reading = sut.read();
   ASSERT_TRUE(reading);

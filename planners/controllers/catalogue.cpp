@@ -18,7 +18,9 @@ bool grasps_in_the_plane(const Scene& scene) {
   return scene.task.kind == physics_pool::kGrasp.name && planar && planar->rotation >= 0;
 }
 
-bool pushes(const Scene& scene) { return scene.task.kind == physics_pool::kPush.name; }
+bool pushes_in_the_plane(const Scene& scene) {
+  return scene.task.kind == physics_pool::kPush.name && as_planar(scene.robot.model);
+}
 
 template <ControlOptions::Method method>
 Result<Outcome> grasp(const ControlSetup& setup, const ControllerOptions& options, const OnEvent& on_event,
@@ -46,7 +48,7 @@ constexpr ControllerKind kNaive{.name = "nr",
 constexpr ControllerKind kMpc{.name = "mpc",
                               .purpose = "model-predictive control of pushing (Sec. 6.2, 7.3)",
                               .parameters = "experiments/pushing.yaml",
-                              .fits = pushes,
+                              .fits = pushes_in_the_plane,
                               .run = push};
 
 std::vector<const ControllerKind*>& catalogue() {
@@ -57,6 +59,14 @@ std::vector<const ControllerKind*>& catalogue() {
 }  // namespace
 
 std::span<const ControllerKind* const> controllers() { return catalogue(); }
+
+std::string controller_help() {
+  std::string text;
+  for (const ControllerKind* kind : catalogue()) {
+    text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", kind->name, kind->purpose);
+  }
+  return text;
+}
 
 void add_controller(const ControllerKind& kind) { catalogue().push_back(&kind); }
 

@@ -36,6 +36,9 @@ struct ControllerKind {
 /// All of them. The first that fits a scene is what the scene gets where nobody names one.
 std::span<const ControllerKind* const> controllers();
 
+/// Names and purposes on one line, for help texts.
+std::string controller_help();
+
 /// By name, or the first that fits the scene where the name is empty.
 /// Error kInvalidArgument: "controller: got 'mpc' for a task to grasp, wanted or, nr".
 Result<const ControllerKind*> find_controller(std::string_view name, const physics_pool::Scene& scene);

@@ -25,11 +25,52 @@ using ::testing::HasSubstr;
 
 constexpr auto kPatience = 60s;  // for what should take well under a second
 
+/// What the suite is asked about: a robot, and two moments of it.
+struct Setting {
+  Scene (*scene)(std::uint64_t seed);
+  void (*before_goal)(const Scene& scene, RolloutBatch& batch);     // a step ends there, with luck
+  void (*before_contact)(const Scene& scene, RolloutBatch& batch);  // a step meets an object
+};
+
+const Setting kGripper{
+    .scene = small_scene,
+    .before_goal =
+        [](const Scene& scene, RolloutBatch& batch) {
+          const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
+          batch.x0.q[kJointX] = target.x - 0.070;  // 10 mm short of the pre-grasp region
+          batch.x0.q[kJointY] = target.y;
+          batch.nominal.step(0)[kControlX] = 0.03;
+        },
+    .before_contact =
+        [](const Scene& scene, RolloutBatch& batch) {
+          const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
+          batch.x0.q[kJointX] = target.x - 0.105;  // a finger meets the target
+          batch.x0.q[kJointY] = target.y + 0.05;
+        }};
+
+const Setting kPusher{
+    .scene =
+        [](std::uint64_t seed) {
+          const double y = 0.01 * static_cast<double>(seed);
+          return pushing_scene(-0.07, y, {slider_disc("target", 0.0, 0.0), slider_disc("other", 0.11, y)});
+        },
+    .before_goal =
+        [](const Scene& scene, RolloutBatch& batch) {
+          const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
+          batch.x0.q[2] = scene.task.goal.x - scene.task.goal.radius - 0.01;  // 1 cm short of the region
+          batch.x0.q[3] = scene.task.goal.y;
+          batch.x0.q[kJointX] = batch.x0.q[2] - target.radius - *disc_radius(scene.robot.model) - 0.001;
+          batch.x0.q[kJointY] = batch.x0.q[3];
+          batch.nominal.step(0)[kControlX] = 0.03;
+        },
+    .before_contact = [](const Scene&, RolloutBatch&) {}};  // the start is one
+
 struct Implementation {
   const char* name;
   int threads;            // in this process, or
   int workers;            // processes over DDS
   bool parareal = false;  // on top of them, with as many iterations as steps
+  const Setting* setting = &kGripper;
 };
 
 // A pool and whatever it needs to be alive. One at a time: a process has one
@@ -92,12 +133,8 @@ class PoolContract : public ::testing::TestWithParam<Implementation> {
     return one.run(batch, in(kPatience)).value();
   }
 
-  // Coarse models know pushers only.
-  static Scene scene_of(std::uint64_t seed) {
-    if (!GetParam().parareal) return small_scene(seed);
-    const double y = 0.01 * static_cast<double>(seed);
-    return pushing_scene(-0.07, y, {slider_disc("target", 0.0, 0.0), slider_disc("other", 0.11, y)});
-  }
+  static const Setting& setting() { return *GetParam().setting; }
+  static Scene scene_of(std::uint64_t seed) { return setting().scene(seed); }
 
   const Scene scene = scene_of(1);
   AsyncPool& engines = *rig().engines;
@@ -119,24 +156,10 @@ class EndOfRig : public ::testing::Environment {
 const auto* const kEndOfRig = ::testing::AddGlobalTestEnvironment(new EndOfRig);
 
 // One step before the goal: noise decides which samples reach it, and stay there.
-RolloutBatch almost_there(const Scene& scene) {
+RolloutBatch almost_there(const Setting& setting, const Scene& scene) {
   RolloutBatch batch = push_batch(scene, 12);
-  const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
-  if (scene.task.is_push()) {
-    batch.x0.q[2] = scene.task.goal.x - scene.task.goal.radius - 0.01;  // 1 cm short of the region
-    batch.x0.q[3] = scene.task.goal.y;
-    batch.x0.q[kJointX] = batch.x0.q[2] - target.radius - *disc_radius(scene.robot.model) - 0.001;
-    batch.x0.q[kJointY] = batch.x0.q[3];
-    batch.nominal.truncate(1);
-    batch.nominal.step(0)[kControlX] = 0.03;
-    batch.objective.success_cost = 1e9;
-    batch.stop_on_success = true;
-    return batch;
-  }
-  batch.x0.q[kJointX] = target.x - 0.070;  // 10 mm short of the pre-grasp region
-  batch.x0.q[kJointY] = target.y;
   batch.nominal.truncate(1);
-  batch.nominal.step(0)[kControlX] = 0.03;
+  setting.before_goal(scene, batch);
   batch.objective.success_cost = 1e9;
   batch.stop_on_success = true;
   return batch;
@@ -183,7 +206,7 @@ TEST_P(PoolContract, WinnerBeatsTheIncumbentOrThereIsNone) {
 }
 
 TEST_P(PoolContract, LowestSuccessfulSampleWins) {
-  const RolloutBatch batch = almost_there(scene);
+  const RolloutBatch batch = almost_there(setting(), scene);
   // One sample at a time: no sibling can interfere.
   int lowest = -1;
   for (std::uint32_t sample = 0; sample < batch.samples && lowest < 0; ++sample) {
@@ -218,9 +241,7 @@ TEST_P(PoolContract, SamplesAreNamedFromTheFirstOneAsked) {
 TEST_P(EnginePoolContract, ReducedPhysicsGivesTheSameBitsEverywhere) {
   for (const Fidelity& fidelity : {Fidelity{.freeze = true}, Fidelity{.freeze = true, .time_step = 0.01}}) {
     RolloutBatch batch = push_batch(scene, 6);
-    const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
-    batch.x0.q[kJointX] = target.x - 0.105;  // a finger meets the target
-    batch.x0.q[kJointY] = target.y + 0.05;
+    setting().before_contact(scene, batch);
     batch.stop_losers = false;
     batch.want_all_trajectories = true;
     batch.fidelity = fidelity;
@@ -492,9 +513,9 @@ INSTANTIATE_TEST_SUITE_P(OneWorker, EnginePoolContract, kOneWorker, kName);
 INSTANTIATE_TEST_SUITE_P(TwoWorkers, PoolContract, kTwoWorkers, kName);
 INSTANTIATE_TEST_SUITE_P(TwoWorkers, EnginePoolContract, kTwoWorkers, kName);
 INSTANTIATE_TEST_SUITE_P(PararealOnThreads, PoolContract,
-                         ::testing::Values(Implementation{"parareal_two_threads", 2, 0, true}), kName);
+                         ::testing::Values(Implementation{"parareal_two_threads", 2, 0, true, &kPusher}), kName);
 INSTANTIATE_TEST_SUITE_P(PararealOnWorkers, PoolContract,
-                         ::testing::Values(Implementation{"parareal_two_workers", 0, 2, true}), kName);
+                         ::testing::Values(Implementation{"parareal_two_workers", 0, 2, true, &kPusher}), kName);
 
 }  // namespace
 }  // namespace jostle::tests

@@ -37,7 +37,7 @@ class RobotContract : public ::testing::TestWithParam<WorldCase> {
     std::vector<double> u = still();
     u[kControlX] = -0.05;
     u[kControlY] = 0.02;
-    if (!scene.task.is_push()) u[kControlRotation] = 0.1;
+    if (scene.robot.model.hand) u[kControlRotation] = 0.1;
     return u;
   }
 
@@ -190,7 +190,7 @@ TEST_P(ObedientRobotContract, MovesByVelocityTimesDuration) {
   ASSERT_TRUE(sut.execute(away(), 0.4));
 
   const RobotReading after = read();
-  const std::size_t moving = scene.task.is_push() ? 2 : 3;  // x, y, and a gripper's rotation
+  const std::size_t moving = scene.robot.model.hand ? 3 : 2;  // x, y, and a gripper's rotation
   for (std::size_t i = 0; i < moving; ++i) {
     const double wanted = away()[i] * 0.4;
     EXPECT_NEAR(after.q[i] - before.q[i], wanted, kLag * std::abs(wanted)) << rig->layout.joints[i];

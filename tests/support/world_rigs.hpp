@@ -152,7 +152,7 @@ class RecordedRig : public WorldRig {
       states_.push_back(x);
       const world::Seen seen{.robot = {.q = {x.q.begin(), x.q.begin() + joints},
                                        .v = {x.v.begin(), x.v.begin() + joints},
-                                       .object_in_hand = scene.task.is_push() ? std::nullopt : std::optional(false)},
+                                       .object_in_hand = scene.robot.model.hand ? std::optional(false) : std::nullopt},
                              .objects = world::object_readings(layout, x)};
       run.observations.push_back(world::to_message(seen, kActionTime * static_cast<double>(i)));
       run.observed.push_back(static_cast<bags::Time>(static_cast<double>(i) * kActionTime * 1e9));

@@ -61,6 +61,7 @@ WorkerService::WorkerService(const wire::Participant& participant, const WorkerO
       name_(options.name.empty() ? fmt::format("{}-{}", host_name(), getpid()) : options.name),
       host_(host_name()),
       threads_(std::max(options.threads, 1)),
+      worlds_(options.memory / 4),
       result_writer_(participant, wire::topics::kPoolResult),
       heartbeat_writer_(participant, wire::topics::kPoolWorker),
       executor_(threads_, options.cores, (options.memory - options.memory / 4) / static_cast<std::size_t>(threads_)),

@@ -9,6 +9,7 @@
 #include <optional>
 #include <thread>
 
+#include "planners/controllers/catalogue.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/results/results.hpp"
 #include "services/studies/experiment/study.hpp"
@@ -56,7 +57,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100000));
   app.add_option("--models", options.models, "Coarse models or predictors, such as planar,learned")->delimiter(',');
   app.add_option("--levels", options.levels, "Uncertainty levels, such as none,medium")->delimiter(',');
-  app.add_option("--controllers", options.controllers, "Controllers, such as or,nr")->delimiter(',');
+  app.add_option("--controllers", options.controllers, planners::controller_help())->delimiter(',');
   app.add_option("--timeout", timeout, "Of one run, s (default: the parameters')")->check(CLI::Range(1.0, 1e6));
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
 

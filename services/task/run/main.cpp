@@ -92,8 +92,7 @@ int main(int argc, char** argv) {
       ->default_str("auto");
   app.add_flag("--pin", pin, "Give each worker process a core of its own, in turn");
   app.add_option("--controller", options.controller,
-                 "To grasp, or: online re-planning (default), nr: naive "
-                 "re-planning; to push, mpc: model-predictive control (default)");
+                 planners::controller_help() + " (default: the first that can do the task)");
   app.add_option(
          "--predictor", options.predictor,
          "What plans of pushes are made with: fine, coarse[,MODEL], parareal:K[,MODEL][,split] or\n"

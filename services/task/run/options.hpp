@@ -18,7 +18,7 @@ struct RunOptions {
   physics_pool::Scene planning;  ///< what the planner believes
   std::string parameters;        ///< YAML text
   physics_pool::Uncertainty level = physics_pool::Uncertainty::kNone;
-  std::string controller;          ///< "or" or "nr" to grasp, "mpc" to push
+  std::string controller;          ///< a name of planners/controllers/catalogue.hpp
   std::string predictor = "fine";  ///< see services/task/config/predictor.hpp
   std::string pool = "dds";
   int workers = 2;

@@ -25,8 +25,8 @@ struct Malformed {
   std::string message;
 };
 
-/// Line, from 1, of a field such as "objects[3].pose.x" in a file's tree; of the
-/// nearest part around it that the file spells out.
+/// Returns the line, from 1, of a field such as "objects[3].pose.x" in a file's tree. Where the file does not spell
+/// the field out, it is the line of the nearest part around it.
 inline int line_of(YAML::Node node, std::string_view field) {
   int line = node.Mark().line + 1;
   while (!field.empty()) {
@@ -80,7 +80,7 @@ class Fields {
     }
   }
 
-  /// One of several words.
+  /// Reads a field that must be one of several words.
   template <class E>
   void choice(const char* key, E& value, std::initializer_list<std::pair<const char*, E>> words) {
     const YAML::Node node = take(key);
@@ -112,11 +112,12 @@ class Fields {
   bool has(const char* key) const { return static_cast<bool>(node_[key]); }
   bool is_mapping(const char* key) const { return node_[key] && node_[key].IsMap(); }
 
-  /// A mapping of names to numbers, in the file's order.
+  /// Reads a mapping of names to numbers, in the file's order.
   void pairs(const char* key, std::vector<std::pair<std::string, double>>& values) {
     const YAML::Node node = take(key);
     if (!node) return;
-    if (!node.IsMap()) fail(node, name(key), fmt::format("got {}, wanted a mapping of names to numbers", describe(node)));
+    if (!node.IsMap())
+      fail(node, name(key), fmt::format("got {}, wanted a mapping of names to numbers", describe(node)));
     for (const auto& entry : node) {
       const auto word = entry.first.as<std::string>();
       values.emplace_back(word, convert<double>(entry.second, name(key) + "." + word));
@@ -129,7 +130,7 @@ class Fields {
     fail(node ? node : node_, name(key), problem);
   }
 
-  /// The key in a list that may be missing.
+  /// Reads a list that may be missing.
   template <class Reader>
   void optional_list(const char* key, Reader read) {
     if (node_[key]) {
@@ -207,7 +208,7 @@ class Fields {
   std::set<std::string> known_;
 };
 
-/// What `read` makes of the text's root node: a Result<T>. Whatever is malformed
+/// Returns what `read` makes of the text's root node, a Result<T>. Whatever is malformed
 /// becomes an Error of kInvalidArgument that names file and line.
 template <class T, class Read>
 Result<T> parse(std::string_view text, const std::string& origin, Read read) {

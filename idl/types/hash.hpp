@@ -12,7 +12,7 @@
 
 namespace jostle {
 
-/// 128 bits of XXH3; equal content has an equal hash on every machine.
+/// A Hash is 128 bits of XXH3; equal content has an equal hash on every machine.
 struct Hash {
   std::uint64_t high = 0;
   std::uint64_t low = 0;
@@ -21,12 +21,12 @@ struct Hash {
   bool empty() const { return high == 0 && low == 0; }
 };
 
-/// 32 lower-case hexadecimal digits.
+/// Writes 32 lower-case hexadecimal digits.
 std::string to_string(const Hash& hash);
 
 Hash hash_of(std::string_view bytes);
 
-/// Of the bits: -0.0 differs from 0.0, so equal hashes mean bit-equal values.
+/// Hashes the bits of the values: -0.0 differs from 0.0, so equal hashes mean bit-equal values.
 Hash hash_of(std::span<const double> values);
 
 }  // namespace jostle

@@ -8,7 +8,8 @@
 
 namespace jostle {
 
-/// The number that all of `text` is, if it lies from `least` to `most`: no sign but a minus, no blanks.
+/// Reads all of `text` as a whole number; nothing unless it lies from `least` to `most`. A minus is allowed, a plus
+/// and blanks are not.
 template <class Integer>
 std::optional<Integer> parse_whole(std::string_view text, Integer least, Integer most) {
   Integer number{};

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Poses: where a frame is, as plain numbers. transform.hpp makes them something to reckon with.
+/// Poses: where a frame is, as plain numbers. transform.hpp turns them into transforms to calculate with.
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace jostle {
 
-/// X_AB: frame B in frame A.
+/// A Pose is X_AB: frame B in frame A.
 struct Pose {
   std::array<double, 3> position{};               ///< p_AoBo_A, m
   std::array<double, 4> orientation{1, 0, 0, 0};  ///< R_AB as a unit quaternion w, x, y, z
@@ -16,18 +16,18 @@ struct Pose {
   bool operator==(const Pose&) const = default;
 };
 
-/// The quaternion w, x, y, z of a turn about z by `yaw` rad.
+/// Returns the quaternion w, x, y, z of a turn about z by `yaw` rad.
 inline std::array<double, 4> turned_about_z(double yaw) { return {std::cos(yaw / 2), 0, 0, std::sin(yaw / 2)}; }
 
-/// The heading of a body's x axis, rad in (-pi, pi]. `q`: unit quaternion w, x, y, z.
+/// Returns the heading of a body's x axis, rad in (-pi, pi]. `q`: unit quaternion w, x, y, z.
 inline double yaw_of(const double* q) {
   return std::atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
 }
 
-/// The z component of a body's z axis in the world: the cosine of its tilt.
+/// Returns the z component of a body's z axis in the world: the cosine of its tilt.
 inline double uprightness(const double* q) { return 1 - 2 * (q[1] * q[1] + q[2] * q[2]); }
 
-/// The angle of the rotation between two unit quaternions, rad in [0, pi].
+/// Returns the angle of the rotation between two unit quaternions, rad in [0, pi].
 inline double angle_between(const double* a, const double* b) {
   const double dot = std::abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
   return 2 * std::acos(std::min(dot, 1.0));

@@ -7,13 +7,13 @@
 
 namespace jostle {
 
-/// As the depth of a reader: every sample, one that waits for a lost predecessor to be sent
-/// again included. For recorders.
+/// A reader of this depth keeps every sample, also one that waits until a lost predecessor is
+/// sent again. For recorders.
 inline constexpr int kKeepAll = 0;
 
-/// A reader may not ask for more than the writer offers; both sides of a topic
-/// take theirs from `topics.hpp`, so they agree. The file of profiles
-/// (profiles.hpp) may say otherwise of a kind or a topic.
+/// What a writer offers, or a reader asks for. A reader may not ask for more than the writer offers; both sides of a
+/// topic take their Qos from `topics.hpp`, so they agree. The file of profiles (profiles.hpp) may change it for a kind
+/// of topic, or for one topic.
 struct Qos {
   bool reliable = true;
   bool latched = false;  ///< transient-local: late readers get the last samples
@@ -31,21 +31,22 @@ struct Qos {
   }
 };
 
-/// Commands and requests, each of which matters. The depth holds a burst to one
+/// kTask is for commands and requests, none of which may be lost. The depth holds a burst to one
 /// peer, so that a slow peer is never the reason to block the writer.
 inline constexpr Qos kTask{.depth = 512, .kind = "task"};
-/// The same where a recorder that comes late wants the whole story.
+/// kCommand is kTask with samples kept for a recorder that comes late and wants all of them.
 inline constexpr Qos kCommand{.retained = true, .depth = 512, .kind = "command"};
-/// Answers to requests: an asker whose reader the answerer has not found yet
-/// gets them when it is found. Who asked sorts out what is its own.
+/// kAnswer is for answers to requests. The writer keeps them, so an asker gets them even if its reader is discovered
+/// only after they were sent. Every asker gets the answers to all requests, and picks out its own.
 inline constexpr Qos kAnswer{.latched = true, .depth = 16, .kind = "answer"};
-/// The last word on something, for whoever comes later.
+/// kLatched is for the last word on something; whoever comes later gets it, too.
 inline constexpr Qos kLatched{.latched = true, .depth = 1, .kind = "latched"};
-/// Newest sample wins; a lost one is not worth repeating.
+/// kStream is for topics of which only the newest sample counts; a lost one is not worth repeating.
 inline constexpr Qos kStream{.reliable = false, .depth = 1, .kind = "stream"};
-/// States that people and recorders follow. What is kept covers a recorder's discovery.
+/// kState is for states that people and recorders follow. The samples kept cover the time that a recorder's discovery
+/// takes.
 inline constexpr Qos kState{.retained = true, .kind = "state"};
-/// One latched sample per key.
+/// kCatalogue keeps one latched sample per key.
 inline constexpr Qos kCatalogue{.latched = true, .depth = 1, .instances = 4096, .kind = "catalogue"};
 
 inline constexpr std::array kKinds{kTask, kCommand, kAnswer, kLatched, kStream, kState, kCatalogue};

@@ -27,12 +27,12 @@ struct Error {
   std::string message;
 };
 
-/// A field that is not as it should be: "FIELD: got GOT, wanted WANTED".
+/// Makes the Error of a field that is not as it should be: "FIELD: got GOT, wanted WANTED".
 inline Error invalid(const std::string& field, const std::string& got, const std::string& wanted) {
   return {Code::kInvalidArgument, field + ": got " + got + ", wanted " + wanted};
 }
 
-/// Either a T or an Error; shaped like std::expected so that it can become it.
+/// A Result holds either a T or an Error; shaped like std::expected so that it can become it.
 template <class T>
 class [[nodiscard]] Result {
  public:

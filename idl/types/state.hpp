@@ -11,7 +11,7 @@
 
 namespace jostle {
 
-/// x = (q, v) in engine order. A free body takes 7 numbers of q (position in
+/// A State is x = (q, v) in engine order. A free body takes 7 numbers of q (position in
 /// the world, then quaternion w, x, y, z) and 6 of v (linear velocity in the
 /// world frame, angular velocity in the body frame).
 struct State {
@@ -44,7 +44,7 @@ struct StateLayout {
   bool operator==(const StateLayout&) const = default;
 };
 
-/// One object's share of a State, which outlives it.
+/// An ObjectView reads one object's part of a State, which outlives it.
 class ObjectView {
  public:
   ObjectView(const ObjectSlot& slot, const State& x) : q_(&x.q[index(slot.q)]), v_(&x.v[index(slot.v)]) {}
@@ -63,7 +63,7 @@ class ObjectView {
   const double* v_;
 };
 
-/// The parts of a State by name. Both arguments outlive it.
+/// A StateView reads the parts of a State by name. Layout and state outlive it.
 class StateView {
  public:
   StateView(const StateLayout& layout, const State& x) : layout_(layout), x_(x) {}
@@ -79,7 +79,7 @@ class StateView {
   const State& x_;
 };
 
-/// U = u_0 … u_{n-1}, each held for the step duration of its user.
+/// The controls U = u_0 … u_{n-1}. Each is held for one control step, whose duration is kept elsewhere.
 struct ControlSequence {
   int nu = 0;                  ///< size of one control; 0 until the first is appended
   std::vector<double> values;  ///< [n][nu] row-major, by axis of the robot, m/s and rad/s
@@ -87,7 +87,7 @@ struct ControlSequence {
   int steps() const { return nu > 0 ? static_cast<int>(values.size()) / nu : 0; }
   std::span<double> step(int t) { return {values.data() + index(t), size(nu)}; }
   std::span<const double> step(int t) const { return {values.data() + index(t), size(nu)}; }
-  /// One control, or several in a row once nu is known.
+  /// Appends one control, or several in a row once nu is known.
   void append(std::span<const double> u) {
     if (nu == 0) nu = static_cast<int>(u.size());
     values.insert(values.end(), u.begin(), u.end());
@@ -102,7 +102,7 @@ struct ControlSequence {
   std::size_t index(int t) const { return size(t) * size(nu); }
 };
 
-/// X = x_0 … x_n, at the borders of the control steps.
+/// A Trajectory is X = x_0 … x_n, at the borders of the control steps.
 using Trajectory = std::vector<State>;
 
 }  // namespace jostle

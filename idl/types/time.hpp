@@ -8,7 +8,7 @@ namespace jostle {
 
 using TimePoint = std::chrono::steady_clock::time_point;
 
-/// A duration as a plain number, s.
+/// Returns a duration as a plain number, s.
 inline double seconds(std::chrono::nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 }  // namespace jostle

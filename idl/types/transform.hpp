@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Poses as transforms of Eigen's. Apart from pose.hpp, because Eigen's headers are large.
+/// Poses as Eigen's transforms. They are not in pose.hpp, because Eigen's headers are large.
 
 #include <Eigen/Geometry>
 

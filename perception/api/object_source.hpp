@@ -19,7 +19,7 @@ struct ObjectReading {
   std::array<double, 3> angular{};                ///< rad/s, body frame
 };
 
-/// Motion capture, cameras, or a simulated world.
+/// An ObjectSource measures where objects are: motion capture, cameras, or a simulated world.
 ///
 /// Threads  one caller at a time.
 /// Errors   kUnavailable      nothing heard for too long; says of what and since when
@@ -28,7 +28,7 @@ class ObjectSource {
  public:
   virtual ~ObjectSource() = default;
 
-  /// The newest measurement of every object in view, in no particular order.
+  /// Returns the newest measurement of every object in view, in no particular order.
   virtual Result<std::vector<ObjectReading>> read() = 0;
 };
 

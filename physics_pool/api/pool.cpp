@@ -60,7 +60,8 @@ Result<std::vector<BatchReply>> AsyncPool::run_all(std::span<const RolloutBatch>
   if (failure) return *failure;
   if (over) return replies;
   if (stop.stop_requested()) return Error{Code::kCancelled, "batch: cancelled by its caller"};
-  return Error{Code::kDeadline, fmt::format("batch: {} of {} rollouts were unfinished at the deadline", unfinished, samples)};
+  return Error{Code::kDeadline,
+               fmt::format("batch: {} of {} rollouts were unfinished at the deadline", unfinished, samples)};
 }
 
 }  // namespace jostle::physics_pool

@@ -12,14 +12,15 @@
 #include <vector>
 
 #include "idl/types/result.hpp"
+#include "idl/types/time.hpp"
 #include "physics_pool/api/rollout.hpp"
 #include "physics_pool/scene/scene.hpp"
 
 namespace jostle::physics_pool {
 
-using TimePoint = std::chrono::steady_clock::time_point;
+using jostle::TimePoint;
 
-/// One worker as its pool sees it. A thread is a worker too.
+/// One worker as its pool sees it. In a pool of threads each thread counts as a worker.
 struct WorkerStatus {
   std::string name;
   int capacity = 1;                ///< rollouts at a time
@@ -30,7 +31,7 @@ struct WorkerStatus {
 
 struct PoolStatus {
   std::vector<WorkerStatus> workers;
-  std::uint64_t reissued = 0;    ///< tasks given to another worker after a death or a stall
+  std::uint64_t reissued = 0;    ///< samples given to another worker after a death or a stall
   std::uint64_t duplicates = 0;  ///< results that came late or twice, counted and dropped
 };
 
@@ -38,9 +39,12 @@ struct PoolStatus {
 ///
 ///   x[0]   = x0
 ///   x[t+1] = F(x[t], u[t])    reset the solver's warm start, set state, run Delta_t
-///   J      = w_g·c_g(x[n]) + sum_t (w_a·c_a + w_d·c_d + w_e·c_e + topple + drop)
+///   J      = sum_i w_i·phi_i(x[n]) + sum_{t<n} sum_i w_i·q_i(u[t-1], u[t], x[t], x[t+1], facts[t])
 ///
-/// Source   Eq. 3.1, 3.2 and lines 3-9 of Alg. 1.
+/// with i over the terms of batch.objective: term i has weight w_i, and its kind (objective/catalogue.hpp) a final
+/// cost phi_i, a running cost q_i, or both. u[-1] is batch.u_before; facts[t] is what happened in step t (StepFacts).
+///
+/// Source   Eq. 3.1 and lines 3-9 of Alg. 1; the terms of J are those of Eq. 3.2, 4.36, 4.37, 6.10 and Sec. 7.3.
 /// Threads  safe from any thread; batches share the workers. Where clients share them
 ///          too, they share by RolloutBatch::priority and, within one, by time.
 /// Time     `run` returns by the deadline at the latest, finished or not, and
@@ -62,28 +66,28 @@ class Pool {
 
   virtual Result<BatchReply> run(const RolloutBatch& batch, TimePoint deadline, std::stop_token stop = {}) = 0;
 
-  /// Several batches, whose rollouts may share the workers: replies in their order. Equal to `run` of each, only
-  /// sooner where the pool can have several under way.
-  /// Errors   the first that a batch has; the others are cancelled
+  /// Runs several batches, whose rollouts may share the workers, and returns their replies in the same order. The
+  /// replies are those of `run`, and come sooner where the pool can have several batches under way.
+  /// Errors   the first error of any batch; the other batches are cancelled
   virtual Result<std::vector<BatchReply>> run_all(std::span<const RolloutBatch> batches, TimePoint deadline,
                                                   std::stop_token stop = {});
 
   virtual PoolStatus status() const = 0;
 };
 
-/// A pool whose batches may be left running: many at once, each as soon as it is
-/// known. That is what slices of a trajectory need.
+/// An AsyncPool takes a batch at any time, while others run. The slices of a trajectory need that: each
+/// starts as soon as its start state is known.
 class AsyncPool : public Pool {
  public:
-  /// A batch under way. Destroying it before its reply cancels it: then on_reply is
-  /// never called. Not to be destroyed from within on_reply, nor after the pool.
+  /// A batch under way. Destroying its ticket before the reply cancels the batch: then on_reply is
+  /// never called. A ticket must not be destroyed from within on_reply, nor after the pool.
   class Ticket {
    public:
     virtual ~Ticket() = default;
     virtual std::uint32_t missing() const = 0;  ///< samples that have not come back
   };
 
-  /// Called once, from a thread of the pool's. Must be quick and use nothing of the pool's.
+  /// Takes the reply of a batch. Called once, from a thread of the pool; must be quick and must not call the pool.
   using OnReply = std::function<void(Result<BatchReply>)>;
 
   /// Starts a batch and returns. The replies are those of `run`.

@@ -67,11 +67,11 @@ Result<void> validate(const RolloutBatch& batch) {
   const auto nu = static_cast<std::size_t>(batch.nominal.nu);
   if (batch.nominal.values.empty() || batch.nominal.values.size() % nu != 0) {
     return invalid("nominal.values", fmt::format("{} values", batch.nominal.values.size()),
-                 fmt::format("a multiple of nu = {}, at least one step", nu));
+                   fmt::format("a multiple of nu = {}, at least one step", nu));
   }
   if (batch.nominal.steps() > kMaxSteps) {
     return invalid("nominal.values", fmt::format("{} steps", batch.nominal.steps()),
-                 fmt::format("at most {}", kMaxSteps));
+                   fmt::format("at most {}", kMaxSteps));
   }
   if (batch.samples < 1 || batch.samples > kMaxSamples) {
     return invalid("samples", std::to_string(batch.samples), fmt::format("1 to {}", kMaxSamples));
@@ -81,11 +81,11 @@ Result<void> validate(const RolloutBatch& batch) {
   }
   if (!(batch.step_duration > 0 && batch.step_duration <= kMaxStepDuration)) {
     return invalid("step_duration", fmt::format("{} s", batch.step_duration),
-                 fmt::format("more than 0, at most {} s", kMaxStepDuration));
+                   fmt::format("more than 0, at most {} s", kMaxStepDuration));
   }
   if (batch.x0.q.size() > kMaxStateSize || batch.x0.v.size() > kMaxStateSize) {
     return invalid("x0", fmt::format("{} + {} values", batch.x0.q.size(), batch.x0.v.size()),
-                 fmt::format("at most {} each", kMaxStateSize));
+                   fmt::format("at most {} each", kMaxStateSize));
   }
   if (std::isnan(batch.incumbent)) return invalid("incumbent", "NaN", "a cost or +inf");
   if (batch.min_steps < 0) return invalid("min_steps", std::to_string(batch.min_steps), ">= 0");
@@ -116,11 +116,11 @@ Result<void> validate(const RolloutBatch& batch) {
   const std::size_t last = std::size_t{batch.first_sample} + batch.samples;
   if (!batch.law.draws.empty() && batch.law.draws.size() < last) {
     return invalid("law.draws", fmt::format("{} values", batch.law.draws.size()),
-                 fmt::format("none, or one for each of {} samples", last));
+                   fmt::format("none, or one for each of {} samples", last));
   }
   if (!(batch.fidelity.time_step >= 0 && batch.fidelity.time_step <= kMaxTimeStep)) {
     return invalid("fidelity.time_step", fmt::format("{} s", batch.fidelity.time_step),
-                 fmt::format("0 for the world's own, at most {} s", kMaxTimeStep));
+                   fmt::format("0 for the world's own, at most {} s", kMaxTimeStep));
   }
   if (batch.law.stream >= kSamplingStreams) {
     return invalid("law.stream", std::to_string(batch.law.stream), fmt::format("less than {}", kSamplingStreams));
@@ -159,7 +159,7 @@ Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, doub
   const double steps = batch.step_duration / time_step;
   if (steps < 0.5 || std::abs(steps - std::round(steps)) > 1e-6 * steps) {
     return invalid("step_duration", fmt::format("{} s", batch.step_duration),
-                 fmt::format("a multiple of the time step, {} s", time_step));
+                   fmt::format("a multiple of the time step, {} s", time_step));
   }
   return {};
 }

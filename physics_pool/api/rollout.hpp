@@ -21,7 +21,7 @@ namespace jostle::physics_pool {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// How sample k's controls follow from the nominal ones:
+/// A sampling law makes sample k's controls from the nominal ones U:
 ///
 ///   u[k][t][i] = clamp(U[t][i] + scales[d mod m]·sigma[t][i]·e[t][i], -limit[i], +limit[i])
 ///   e[t][i] = persistence·e[t-1][i] + sqrt(1 - persistence^2)·z,   e[0][i] = z
@@ -39,19 +39,19 @@ struct SamplingLaw {
   std::vector<double> scales{1.0};
   std::uint64_t seed = 0;
   std::uint32_t stream = 0;  ///< the planner's iteration: same seed, fresh noise; below kSamplingStreams
-  double persistence = 0.0;  ///< in [0, 1): of the noise from step to step; 0 is white
-  /// Empty, or the draw that each sample stands for: a batch of a few picked from
+  double persistence = 0.0;  ///< in [0, 1): how much of the noise the next step keeps; 0 is white
+  /// Empty, or [K] the draw d of each sample. So a small batch can run samples picked from
   /// the draws of a larger one.
   std::vector<std::uint32_t> draws;
 
-  /// Of step t.
+  /// Returns the standard deviations of step t, [nu].
   std::span<const double> sigma_of(int t) const {
     const std::size_t nu = limit.size(), row = sigma.size() > nu ? static_cast<std::size_t>(t) * nu : 0;
     return {sigma.data() + row, nu};
   }
 };
 
-/// How much physics a rollout is worth. The defaults are the fine model F.
+/// How exact the physics of a rollout is. The defaults are the fine model F.
 struct Fidelity {
   /// Objects that stand still have no freedom until something touches them. The
   /// touch is found before it has any effect, and the object is free from there on.
@@ -72,7 +72,7 @@ enum class Priority : std::uint8_t {
 
 /// K rollouts of n control steps from one state.
 struct RolloutBatch {
-  Hash world;                    ///< of a scene given to Pool::load
+  Hash world;                    ///< names a scene given to Pool::load
   State x0;                      ///< [nq], [nv]
   ControlSequence nominal;       ///< [n][nu]
   std::vector<double> u_before;  ///< [nu] control before step 0, for c_a; the thesis's u_{-1} = 0
@@ -84,17 +84,18 @@ struct RolloutBatch {
   /// Cost to beat: a rollout that can no longer get below it, nor succeed, stops.
   double incumbent = kInfinity;
   bool stop_losers = true;  ///< off: every rollout runs to its end
-  /// Judge losers by what is still to come as well (`objective/bound.hpp`).
+  /// Also judge losers by the cost that is bound to come (`objective/bound.hpp`).
   bool stop_hopeless = false;
   bool stop_on_success = false;  ///< Alg. 1, lines 8-9
   int min_steps = 0;             ///< n_min: success counts from this control step (0-based) on
   bool want_all_trajectories = false;
-  /// Of physics, drawn by (sample, engine step, degree of freedom), so that all candidates can meet the same: a batch
-  /// of one candidate has as many samples as noises. Wants the fine model: what is frozen would get none.
+  /// The noise of physics, drawn by (sample, engine step, degree of freedom). So all candidates can meet the same
+  /// noises: each has a batch of its own, with one sample per noise. It needs the fine model, because frozen objects
+  /// would get no noise.
   VelocityNoise noise;
   Fidelity fidelity;
   Priority priority = Priority::kNormal;
-  /// Scheduling studies only: wait this long per rollout and simulate nothing.
+  /// Wait this long per rollout and simulate nothing; for scheduling studies only.
   std::optional<std::chrono::nanoseconds> wait;
 };
 

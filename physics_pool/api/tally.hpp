@@ -20,10 +20,12 @@ class Tally {
   Tally(const TaskGeometry& geometry, const RolloutBatch& batch, const ControlSequence& controls,
         RolloutOutcome& outcome);
 
-  /// The next control step ended in x, and facts say what happened on the way. How the rollout ends, if it does so there.
+  /// Counts the next control step, which ended in x; `facts` say what happened during it. Returns how the rollout ends,
+  /// if it ends there.
   std::optional<End> count(const State& x, const StepFacts& facts = {});
 
-  /// Closes the outcome: cost, steps, and the trajectory if it is worth its way.
+  /// Completes the outcome: cost and steps. The trajectory stays in it only if the rollout may win, or the batch wants
+  /// all trajectories.
   void close(End end);
 
   double sum() const { return sum_; }                                         ///< so far

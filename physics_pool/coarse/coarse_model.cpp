@@ -13,10 +13,11 @@ namespace jostle::physics_pool {
 
 Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, const Scene& scene) {
   if (!disc_radius(scene.robot.model)) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("scene '{}': robot.model: got '{}', wanted a disc that moves in the plane, as the pusher is: "
-                             "coarse models know no other robot",
-                             scene.name, scene.robot.model.name)};
+    return Error{
+        Code::kInvalidArgument,
+        fmt::format("scene '{}': robot.model: got '{}', wanted a disc that moves in the plane, as the pusher is: "
+                    "coarse models know no other robot",
+                    scene.name, scene.robot.model.name)};
   }
   constexpr std::string_view kLearned = "learned:";
   if (name.starts_with(kLearned)) return load_learned_model(name.substr(kLearned.size()), scene);

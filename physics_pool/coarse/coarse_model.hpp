@@ -29,7 +29,7 @@ struct PlanarLayout {
   int pusher_velocity() const { return half(); }
 };
 
-/// C of Eq. 6.2: x <- C(x, u, Delta_t), a pure function, K states at a time.
+/// A coarse model is C of Eq. 6.2: x <- C(x, u, Delta_t), a pure function, for K states at a time.
 ///
 /// Frames   as PlanarLayout; u = (u_x, u_y), the pusher's velocity, m/s.
 /// Threads  one at a time. Nothing is allocated after construction for K <= kMaxBatch.
@@ -40,7 +40,7 @@ class CoarseModel {
 
   virtual ~CoarseModel() = default;
 
-  /// As it is asked for by make_coarse_model.
+  /// The name by which make_coarse_model knows it.
   virtual std::string_view name() const = 0;
   virtual PlanarLayout layout() const = 0;
 
@@ -48,13 +48,13 @@ class CoarseModel {
   virtual void advance(std::span<double> states, std::span<const double> controls, double duration) = 0;
 };
 
-/// `name`: kinematic (Eq. 6.5-6.8), limit-surface, planar, or learned:FILE (Sec. 7.2).
+/// Makes a coarse model by `name`: kinematic (Eq. 6.5-6.8), limit-surface, planar, or learned:FILE (Sec. 7.2).
 /// Errors   kInvalidArgument  unknown name, a scene without a pusher, or a model that
 ///          does not fit the scene; says which and what would
 ///          kIo               a file that cannot be read
 Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, const Scene& scene);
 
-/// The planar part of a state of a pusher's scene. theta is the yaw of the slider's
+/// Writes the planar part of a state of a pusher's scene. theta is the yaw of the slider's
 /// x axis in (-pi, pi].
 void to_planar(const StateLayout& layout, const State& x, std::span<double> planar);
 

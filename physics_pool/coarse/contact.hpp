@@ -31,13 +31,14 @@ struct PlanarPose {
   double cosine = 1.0, sine = 0.0;
 };
 
-/// `normal` points from b to a: moving a by depth·normal ends the overlap there.
+/// A point where two outlines a and b overlap. `normal` points from b to a: moving a by
+/// depth·normal ends the overlap there.
 struct Contact {
   Eigen::Vector2d point, normal;
   double depth = 0.0;  // m, > 0
 };
 
-/// At most two: a disc has one, boxes that meet along an edge have two.
+/// The contacts of two outlines, at most two: a disc has one, boxes that meet along an edge have two.
 class Contacts {
  public:
   void add(const Contact& contact) { values_[count_++] = contact; }
@@ -50,7 +51,7 @@ class Contacts {
   std::size_t count_ = 0;
 };
 
-/// Of two outlines that overlap by more than `tolerance` metres; empty otherwise, and
+/// Finds the contacts of two outlines that overlap by more than `tolerance` metres. Empty for others, and
 /// for poses that are not finite.
 Contacts find_contacts(const Outline& a, const PlanarPose& pose_a, const Outline& b, const PlanarPose& pose_b,
                        double tolerance = 0.0);

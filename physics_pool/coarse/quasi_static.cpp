@@ -51,7 +51,9 @@ class Response {
 }  // namespace
 
 QuasiStaticModel::QuasiStaticModel(const Scene& scene, const QuasiStaticOptions& options)
-    : layout_{static_cast<int>(scene.objects.size())}, options_(options), pusher_{.radius = disc_radius(scene.robot.model).value()} {
+    : layout_{static_cast<int>(scene.objects.size())},
+      options_(options),
+      pusher_{.radius = disc_radius(scene.robot.model).value()} {
   for (const SceneObject& object : scene.objects) {
     const Outline shape = outline(object);
     const double c = shape.radius > 0 ? shape.radius : std::hypot(shape.half_x, shape.half_y);

@@ -31,8 +31,8 @@ struct QuasiStaticOptions {
 /// the motion cone and slides along its edge otherwise (Lynch, Maekawa & Tanie,
 /// "Manipulation and active sensing by pushing using tactile feedback", IROS 1992).
 ///
-/// The pusher goes its way in short substeps; what it, or a slider, has entered is
-/// moved out along these rules, contact after contact (Gauss-Seidel). With one contact
+/// The pusher moves in short substeps. A slider that the pusher, or another slider, has entered is
+/// moved out by these rules, contact after contact (Gauss-Seidel). With one contact
 /// that is the closed form of the motion cone; with many, sliders push each other.
 class QuasiStaticModel final : public CoarseModel {
  public:

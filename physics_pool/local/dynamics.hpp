@@ -14,12 +14,12 @@
 
 namespace jostle::physics_pool {
 
-/// How far an advance came.
+/// What came of an advance.
 struct Advance {
   std::uint64_t engine_steps = 0;
   std::uint32_t thawed = 0;  ///< frozen objects that were touched and set free
   bool interrupted = false;
-  StepFacts facts;  ///< over all its engine steps
+  StepFacts facts;       ///< over all its engine steps
   std::string diverged;  ///< empty, or why the state is of no use
 };
 
@@ -30,7 +30,7 @@ struct Disturbance {
   std::uint64_t first_step = 0;  ///< engine steps done before
 };
 
-/// x <- F(x, u), a pure function of its arguments: nothing of the engine's memory
+/// Computes x <- F(x, u), a pure function of its arguments: nothing of the engine's memory
 /// reaches the next call, so a trajectory may be cut at any control step and
 /// continued elsewhere. States are always those of the full world.
 ///
@@ -44,11 +44,11 @@ class Dynamics {
 
   /// Runs `engine_steps` from x under u. `interrupted` is asked before each step;
   /// may be empty. After an interruption or a divergence x is of no use.
-  /// `disturbance`: of the fine model only (`validate` of batches sees to it).
+  /// `disturbance`: only the fine model may be given one (`validate` of batches sees to it).
   virtual Advance advance(State& x, std::span<const double> u, int engine_steps,
                           const std::function<bool()>& interrupted = {}, const Disturbance& disturbance = {}) = 0;
 
-  /// Memory it holds at present.
+  /// Returns the memory it holds at present.
   virtual std::size_t bytes() const = 0;
 };
 

@@ -69,7 +69,8 @@ void note_contacts(const mjModel& model, const mjData& data, const Scene& scene,
   if (scene.fixtures.empty() || facts.robot_hit_fixture) return;
   for (int i = 0; i < data.ncon; ++i) {
     const double a = mark(&model, data.contact[i].geom1), b = mark(&model, data.contact[i].geom2);
-    if ((a == kFixtureMark && b == kRobotMark) || (a == kRobotMark && b == kFixtureMark)) facts.robot_hit_fixture = true;
+    if ((a == kFixtureMark && b == kRobotMark) || (a == kRobotMark && b == kFixtureMark))
+      facts.robot_hit_fixture = true;
   }
 }
 
@@ -102,7 +103,8 @@ void DataDeleter::operator()(mjData* data) const { mj_deleteData(data); }
 const char* engine_version() { return mj_versionString(); }
 
 std::size_t bytes_of(const mjData& data) {
-  return sizeof(mjData) + static_cast<std::size_t>(data.nbuffer) + sizeof(mjtNum) * static_cast<std::size_t>(data.nstack);
+  return sizeof(mjData) + static_cast<std::size_t>(data.nbuffer) +
+         sizeof(mjtNum) * static_cast<std::size_t>(data.nstack);
 }
 
 }  // namespace jostle::physics_pool

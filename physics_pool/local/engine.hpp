@@ -16,8 +16,8 @@
 
 namespace jostle::physics_pool {
 
-/// What mju_error would have said before ending the process. Thrown through
-/// the engine's frames, so the mjData in use must be discarded. Never leaves
+/// An EngineError says what mju_error would have said before ending the process. It is thrown through
+/// the engine's frames, so the mjData in use must be discarded. It never leaves
 /// physics_pool/local.
 class EngineError : public std::runtime_error {
  public:
@@ -33,26 +33,26 @@ void set_controls(const RobotModel& robot, mjData& data, std::span<const double>
 /// Adds what the contacts of the step that is being prepared (after mj_step1) say.
 void note_contacts(const mjModel& model, const mjData& data, const Scene& scene, StepFacts& facts);
 
-/// The second half of a step, mj_step2; a robot that carries itself gets the forces that balance its weight.
+/// Runs the second half of a step, mj_step2; a robot that carries itself gets the forces that balance its weight.
 void finish_step(const mjModel& model, mjData& data, const RobotModel& robot);
 
-/// Leaves nothing of what ran before: warm start, warnings, time.
+/// Resets what earlier steps left in `data`: warm start, warnings, time.
 void forget(const mjModel& model, mjData& data);
 
-/// Empty, or why the state is of no use: a warning since forget(), or a number
-/// that is not finite.
+/// Says why the state is of no use: a warning since forget(), or a number
+/// that is not finite. Empty if it is good.
 std::string divergence(const mjModel& model, const mjData& data);
 
-/// Memory that scratch data holds.
+/// Returns the memory that scratch data holds.
 std::size_t bytes_of(const mjData& data);
 
-/// geom_user[0] of the surface: it supports a body only while the body's
+/// Marks a geom (geom_user[0]) as the surface: it supports a body only while the body's
 /// centre is above it. MuJoCo's planes are infinite, yet they give steadier
 /// contacts than boxes (four points under a cylinder instead of one).
 inline constexpr double kSurfaceMark = 1.0;
-/// The floor far below, where what has dropped ends: it meets nothing else.
+/// Marks the floor far below, where dropped objects end; it touches nothing else.
 inline constexpr double kFloorMark = 2.0;
-/// What contacts are told apart by.
+/// These mark fixtures and the robot, so that contacts between them can be told from others.
 inline constexpr double kFixtureMark = 3.0;
 inline constexpr double kRobotMark = 4.0;
 

@@ -19,7 +19,7 @@ class ExecutionWorld {
   /// Starts to apply u (m/s, rad/s) from the present state.
   void begin(std::span<const double> u);
 
-  /// One engine step. Error kInternal if the engine diverged.
+  /// Makes one engine step. Error kInternal if the engine diverged.
   Result<void> step();
 
   const World& world() const { return simulator_.world(); }

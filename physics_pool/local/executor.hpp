@@ -40,8 +40,8 @@ class Executor {
   static constexpr std::size_t kBytesPerThread = std::size_t{128} << 20;
 
   /// `cores`: thread i stays on cores[i], if there are any; else the system chooses.
-  /// `bytes_per_thread`: of simulators that a thread keeps for the next batch; the one in use is always kept.
-  /// Throws std::system_error when this process may not use one of them.
+  /// `bytes_per_thread`: room for simulators that a thread keeps for the next batch; the one in use is always kept.
+  /// Throws std::system_error when this process may not use one of the cores.
   explicit Executor(int threads, const std::vector<int>& cores = {}, std::size_t bytes_per_thread = kBytesPerThread);
   /// Skips what is queued and waits for what runs (a millisecond once its
   /// signals are cancelled; a whole rollout otherwise).

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// Who owns the engine's objects, without the engine's headers: what other rooms include of this
-/// folder stands on this file, and only sources see MuJoCo.
+/// Owning pointers to the engine's objects, without the engine's headers. The headers of this folder that
+/// other rooms include use these pointers, so that only sources see MuJoCo.
 
 #include <memory>
 
@@ -19,7 +19,7 @@ struct DataDeleter {
 using ModelPtr = std::unique_ptr<mjModel_, ModelDeleter>;
 using DataPtr = std::unique_ptr<mjData_, DataDeleter>;
 
-/// The version of the MuJoCo library that is loaded, such as "2.2.2".
+/// Returns the version of the MuJoCo library that is loaded, such as "2.2.2".
 const char* engine_version();
 
 }  // namespace jostle::physics_pool

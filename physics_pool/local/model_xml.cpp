@@ -153,7 +153,8 @@ void write_meshes(Writer& xml, const RobotModel& robot) {
 void write_joint(Writer& xml, const Joint& joint) {
   xml.line(R"(<joint name="{}" type="{}" axis="{}"{} armature="{}"/>)", quoted(joint.name),
            joint.kind == JointKind::kSlide ? "slide" : "hinge", fmt::join(joint.axis, " "),
-           joint.is_limited() ? fmt::format(R"( range="{} {}" limited="true")", joint.low, joint.high) : "", joint.armature);
+           joint.is_limited() ? fmt::format(R"( range="{} {}" limited="true")", joint.low, joint.high) : "",
+           joint.armature);
 }
 
 void write_geom(Writer& xml, const RobotGeom& geom, bool has_mass, int& mesh) {

@@ -9,18 +9,18 @@
 
 namespace jostle::physics_pool {
 
-/// Before the names of the robot's bodies: URDF files like to have a link "world", which is the engine's own.
+/// Stands before the names of the robot's bodies: URDF files often have a link "world", a name that the engine uses.
 inline constexpr const char* kLinkPrefix = "link:";
 
-/// What of a scene goes into a model.
+/// Says which parts of a scene go into a model.
 struct ModelContent {
-  /// Objects with freedom, from the first on; the others are mocap bodies, which
-  /// stand where they are put and meet only what moves.
+  /// The first `free` objects can move. The others are mocap bodies, which
+  /// stand where they are put and touch only what moves.
   int free = INT_MAX;
-  bool looks = false;  ///< what only pictures need: a megabyte of sky
+  bool looks = false;  ///< whether it has what only pictures need: a megabyte of sky
 };
 
-/// Joints and actuators come in the order of layout_of(scene); bodies and geoms
+/// Writes a scene as MJCF. Joints and actuators come in the order of layout_of(scene); bodies and geoms
 /// of the objects come last, in their order.
 std::string model_xml(const Scene& scene, const ModelContent& content = {});
 

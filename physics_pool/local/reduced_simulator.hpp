@@ -21,15 +21,15 @@ namespace jostle::physics_pool {
 ///
 /// What differs from the fine model: frozen objects do not creep, settle, or push
 /// each other apart where they overlap, and the solver's warm start is reset when
-/// an object is freed. Everything free, and
-/// the world's own time step, is the fine model bit for bit.
+/// an object is freed. With all objects free, and the world's own time step, it is
+/// the fine model bit for bit.
 ///
 /// Models are made per number of free objects, not per set of them: which objects
 /// they are is a matter of sizes, masses and frictions, written into this thread's
 /// copy of the model.
 ///
-/// Threads  one at a time. Allocates when a number of free objects occurs that has
-///          no model, which is for the first time, or again if there were many.
+/// Threads  one at a time. Allocates when it has no model for the present number of free
+///          objects: the first time, and again if that model was dropped, as there were many.
 class ReducedSimulator final : public Dynamics {
  public:
   ReducedSimulator(WorldPtr world, const Fidelity& fidelity);
@@ -38,8 +38,8 @@ class ReducedSimulator final : public Dynamics {
   const World& world() const override { return *world_; }
   double time_step() const override { return time_step_; }
 
-  Advance advance(State& x, std::span<const double> u, int engine_steps,
-                  const std::function<bool()>& interrupted = {}, const Disturbance& disturbance = {}) override;
+  Advance advance(State& x, std::span<const double> u, int engine_steps, const std::function<bool()>& interrupted = {},
+                  const Disturbance& disturbance = {}) override;
   std::size_t bytes() const override;
 
  private:

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <thread>
 
-#include "physics_pool/objective/bound.hpp"
 #include "physics_pool/api/tally.hpp"
+#include "physics_pool/objective/bound.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -44,9 +44,9 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
 
   for (int t = 0; t < steps; ++t) {
     const auto u = std::as_const(controls).step(t);
-    auto advance = dynamics.advance(
-        x, u, engine_steps, obsolete,
-        {.noise = batch.noise, .stream = {.sample = sample}, .first_step = outcome.engine_steps});
+    auto advance =
+        dynamics.advance(x, u, engine_steps, obsolete,
+                         {.noise = batch.noise, .stream = {.sample = sample}, .first_step = outcome.engine_steps});
     outcome.engine_steps += advance.engine_steps;
     outcome.thawed += advance.thawed;
     if (advance.interrupted) return finish(End::kSkipped);

@@ -14,9 +14,9 @@ namespace jostle::physics_pool {
 /// What the rollouts of one batch tell each other while they run.
 class BatchSignals {
  public:
-  /// A finished rollout's cost; rollouts that cannot beat the best one stop.
+  /// Takes a finished rollout's cost; rollouts that cannot beat the best one stop.
   void offer_cost(double cost) { lower(best_, cost); }
-  /// A rollout succeeded; those with a higher index need not run.
+  /// Notes that a rollout succeeded; those with a higher index need not run.
   void offer_success(std::uint32_t sample) { lower(first_success_, sample); }
   void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
 

@@ -45,7 +45,8 @@ void Simulator::disturb(const VelocityNoise& noise, const NoiseStream& stream, s
                         std::span<const double> u) {
   const double sigma = noise.sigma + noise.slope * control_norm(world_->scene().robot.model, u);
   if (sigma == 0) return;
-  for (int dof = 0; dof < world_->model()->nv; ++dof) data_->qvel[dof] += sigma * velocity_draw(noise, stream, step, dof);
+  for (int dof = 0; dof < world_->model()->nv; ++dof)
+    data_->qvel[dof] += sigma * velocity_draw(noise, stream, step, dof);
 }
 
 std::size_t Simulator::bytes() const { return bytes_of(*data_); }

@@ -15,11 +15,11 @@ class Simulator final : public Dynamics {
   const World& world() const override { return *world_; }
   double time_step() const override { return world_->time_step(); }
 
-  Advance advance(State& x, std::span<const double> u, int engine_steps,
-                  const std::function<bool()>& interrupted = {}, const Disturbance& disturbance = {}) override;
+  Advance advance(State& x, std::span<const double> u, int engine_steps, const std::function<bool()>& interrupted = {},
+                  const Disturbance& disturbance = {}) override;
   std::size_t bytes() const override;
 
-  /// The same in parts, for worlds that are observed or disturbed while they
+  /// These do the same in parts, for worlds that are observed or disturbed while they
   /// move: begin once, then step as often as needed.
   void begin(const State& x, std::span<const double> u);
   void step();
@@ -35,10 +35,10 @@ class Simulator final : public Dynamics {
   StepFacts facts_;  // since begin()
 };
 
-/// What separate() came to.
+/// What came of separate().
 struct Separated {
   State x;
-  double deepest = 0.0;  ///< m, how far two bodies are in each other still; above `depth` if the rounds did not do
+  double deepest = 0.0;  ///< m, deepest overlap that is left; above `depth` if the rounds did not suffice
 };
 
 /// Moves objects apart that overlap in x, as happens when a belief of shapes

@@ -11,8 +11,8 @@
 
 namespace jostle::physics_pool {
 
-/// Pool of threads in this process. Destroy it after every `run` has returned and
-/// every ticket is gone; a ticket that goes waits for what runs (a millisecond).
+/// A pool of threads in this process. Destroy it after every `run` has returned and
+/// every ticket is gone; destroying a ticket waits for its running samples (a millisecond).
 class ThreadPool final : public AsyncPool {
  public:
   explicit ThreadPool(int threads);

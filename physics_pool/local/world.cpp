@@ -51,11 +51,13 @@ Result<void> check_start(const World& world) {
   try {
     mj_forward(&model, data.get());
   } catch (const EngineError& error) {
-    return Error{Code::kInvalidArgument, fmt::format("scene '{}': the engine refused its start: {}", scene.name, error.what())};
+    return Error{Code::kInvalidArgument,
+                 fmt::format("scene '{}': the engine refused its start: {}", scene.name, error.what())};
   }
   const auto name = [&](int geom) -> std::string {
     const int first_object = model.ngeom - static_cast<int>(scene.objects.size());
-    if (geom >= first_object) return fmt::format("object '{}'", scene.objects[static_cast<std::size_t>(geom - first_object)].name);
+    if (geom >= first_object)
+      return fmt::format("object '{}'", scene.objects[static_cast<std::size_t>(geom - first_object)].name);
     const char* known = mj_id2name(&model, mjOBJ_GEOM, geom);
     const char* body = mj_id2name(&model, mjOBJ_BODY, model.geom_bodyid[geom]);
     if (known) return fmt::format("'{}'", known);
@@ -63,12 +65,14 @@ Result<void> check_start(const World& world) {
   };
   for (int i = 0; i < data->ncon; ++i) {
     const mjContact& contact = data->contact[i];
-    const bool stands = model.geom_type[contact.geom1] == mjGEOM_PLANE || model.geom_type[contact.geom2] == mjGEOM_PLANE;
+    const bool stands =
+        model.geom_type[contact.geom1] == mjGEOM_PLANE || model.geom_type[contact.geom2] == mjGEOM_PLANE;
     if (stands || contact.dist >= -kDeep) continue;
-    return Error{Code::kInvalidArgument,
-                 fmt::format("scene '{}': at its start {} is {:.1f} mm inside {}, wanted free places; move one of them, or "
-                             "robot.start",
-                             scene.name, name(contact.geom2), -1e3 * contact.dist, name(contact.geom1))};
+    return Error{
+        Code::kInvalidArgument,
+        fmt::format("scene '{}': at its start {} is {:.1f} mm inside {}, wanted free places; move one of them, or "
+                    "robot.start",
+                    scene.name, name(contact.geom2), -1e3 * contact.dist, name(contact.geom1))};
   }
   return {};
 }

@@ -16,11 +16,11 @@
 namespace jostle::physics_pool {
 
 class World;
-/// Shared: every simulating thread reads the same compiled model, and the last
+/// A world is shared: every simulating thread reads the same compiled model, and the last
 /// one to finish with it frees it.
 using WorldPtr = std::shared_ptr<const World>;
 
-/// Immutable after compilation; read by any number of threads.
+/// A World is immutable after compilation; any number of threads may read it.
 class World {
  public:
   enum class Purpose { kPhysics, kPictures };
@@ -32,10 +32,10 @@ class World {
   const Hash& hash() const { return hash_; }
   const TaskGeometry& geometry() const { return geometry_; }
   const mjModel_* model() const { return model_.get(); }
-  std::size_t bytes() const;  ///< of the compiled model, without reduced ones
+  std::size_t bytes() const;  ///< memory of the compiled model, without reduced ones
   double time_step() const { return scene_.physics.time_step; }
 
-  /// The same world in which only the first `free` objects can move (see
+  /// Returns the model of the same world in which only the first `free` objects can move (see
   /// ModelContent). Compiled when first asked for, once for all threads.
   /// Threads  safe from any thread. Throws EngineError.
   const mjModel_* reduced_model(int free) const;

@@ -15,7 +15,7 @@ struct Speeds {
   double translation, turning, finger;  // m/s, rad/s, m/s
 };
 
-// Of the hand of a robot that moves in the plane.
+// The speeds of the hand of a robot that moves in the plane.
 Speeds speeds(const TaskGeometry& geometry, std::span<const double> u) {
   const auto of = [&](int axis) { return axis < 0 ? 0.0 : u[static_cast<std::size_t>(axis)]; };
   return {.translation = std::hypot(of(geometry.planar->x), of(geometry.planar->y)),

@@ -10,26 +10,26 @@
 
 namespace jostle::physics_pool {
 
-/// What is certain of a rollout before control step `done`, whose controls are known.
+/// What is certain about a rollout before control step `done`, if all its controls are known.
 struct Outlook {
   double cost = 0.0;        ///< at least this is still to come: running costs and goal
   bool may_succeed = true;  ///< the goal can still be reached
 };
 
-/// Certain are the changes of control, and that what has dropped stays down. Of the
-/// goal's cost: distance shrinks no faster than hand and target can approach
-/// each other,
+/// Bounds from below the cost that is still to come. Certain are the changes of control, and that what has
+/// dropped stays down. If a planar hand is to grasp, the goal's cost has a bound, too, as the target's distance
+/// shrinks no faster than hand and target can approach each other:
 ///
 ///   d_T(end) >= d_T - sum_s (2·a_s + w_s·(d_T + a_0 + … + a_s) + f_s)·Delta_t
 ///
 /// with a_s the hand's speed in step s, w_s its rate of turning and f_s the speed of
 /// a finger, each the larger of what is commanded and what was commanded before (a
-/// drive never overshoots). This assumes that the target moves no faster than the
-/// hand and what turns with it at the target's distance would. A target that is
-/// squeezed out of a wedge or flung by a lever could; none of some thousand random
-/// pushes did (bound_test.cpp, and equal plans in `jostle bench cheap-physics`).
-/// Nothing is foretold of how a pushed target comes to its goal, which may have been given any speed, nor of arms
-/// that do not move in the plane.
+/// drive never overshoots). This assumes that the target moves no faster than a point would
+/// that is fixed to the hand at the target's distance. A target that is
+/// squeezed out of a wedge or flung by a lever could be faster; none of some thousand random
+/// pushes was (bound_test.cpp, and equal plans in `jostle bench cheap-physics`).
+/// For other tasks, and for arms that do not move in the plane, the goal's cost has no bound: a pushed target, say, may
+/// have been given any speed.
 ///
 /// `u_before`: control before step `done`.
 Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls, int done,

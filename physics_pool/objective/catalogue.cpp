@@ -16,12 +16,11 @@ namespace {
 
 using Values = std::span<const double>;
 
-const TermKind kAcceleration{
-    .name = "acceleration",
-    .unit = "per (m/s)^2 or (rad/s)^2",
-    .weight = 0.1,
-    .meaning = "w_a of Eq. 3.2, w_u of Eq. 6.10: squared change of control",
-    .running = [](const Step& s, Values) { return acceleration_cost(s.u_before, s.u); }};
+const TermKind kAcceleration{.name = "acceleration",
+                             .unit = "per (m/s)^2 or (rad/s)^2",
+                             .weight = 0.1,
+                             .meaning = "w_a of Eq. 3.2, w_u of Eq. 6.10: squared change of control",
+                             .running = [](const Step& s, Values) { return acceleration_cost(s.u_before, s.u); }};
 
 const TermKind kDisturbance{
     .name = "disturbance",
@@ -31,7 +30,8 @@ const TermKind kDisturbance{
     .parameters = {{.name = "rotation",
                     .unit = "m^2/rad^2",
                     .initial = 0.0,
-                    .meaning = "weight of a squared rotation against a squared translation; 0 counts only translations"}},
+                    .meaning =
+                        "weight of a squared rotation against a squared translation; 0 counts only translations"}},
     .running = [](const Step& s, Values v) { return disturbance_cost(s.geometry, s.x0, s.x1, v[0]); }};
 
 const TermKind kEdge{
@@ -52,51 +52,53 @@ const TermKind kEdge{
       return edge_cost(s.geometry, s.x0, s.x1, {.rate = v[0], .exponent_max = v[1], .margin = v[2]});
     }};
 
-const TermKind kTopple{.name = "topple",
-                       .unit = "1",
-                       .weight = 2000.0,
-                       .meaning = "per toppled object and step, once it lies (Eq. 4.37)",
-                       .parameters = {{.name = "angle",
-                                       .unit = "rad",
-                                       .initial = 0.5,
-                                       .most = std::numbers::pi,
-                                       .meaning = "tilt above which an object counts as toppled"}},
-                       .running = [](const Step& s, Values v) -> double {
-                         return toppled_objects(s.geometry, s.x1, v[0]);
-                       }};
+const TermKind kTopple{
+    .name = "topple",
+    .unit = "1",
+    .weight = 2000.0,
+    .meaning = "per toppled object and step, once it lies (Eq. 4.37)",
+    .parameters = {{.name = "angle",
+                    .unit = "rad",
+                    .initial = 0.5,
+                    .most = std::numbers::pi,
+                    .meaning = "tilt above which an object counts as toppled"}},
+    .running = [](const Step& s, Values v) -> double { return toppled_objects(s.geometry, s.x1, v[0]); }};
 
-const TermKind kDrop{.name = "drop",
-                     .unit = "1",
-                     .weight = 20000.0,
-                     .meaning = "per dropped object and step, once it has fallen; W_E of Sec. 7.3",
-                     .parameters = {{.name = "height",
-                                     .unit = "m",
-                                     .initial = 0.02,
-                                     .meaning = "below its resting height at which an object counts as dropped"}},
-                     .running = [](const Step& s, Values v) -> double { return count_dropped(s.geometry, s.x1, v[0]); }};
+const TermKind kDrop{
+    .name = "drop",
+    .unit = "1",
+    .weight = 20000.0,
+    .meaning = "per dropped object and step, once it has fallen; W_E of Sec. 7.3",
+    .parameters = {{.name = "height",
+                    .unit = "m",
+                    .initial = 0.02,
+                    .meaning = "below its resting height at which an object counts as dropped"}},
+    .running = [](const Step& s, Values v) -> double { return count_dropped(s.geometry, s.x1, v[0]); }};
 
 const TermKind kObstacle{
     .name = "obstacle",
     .unit = "1",
     .weight = 1.0,
     .meaning = "Eq. 6.10: target and pusher near the keep-out area",
-    .parameters = {{.name = "target", .unit = "m^2", .initial = 5.0, .meaning = "w_s, over the target's squared distance"},
-                   {.name = "pusher", .unit = "m^2", .initial = 1.0, .meaning = "w_p, over the pusher's squared distance"},
-                   {.name = "nearest",
-                    .unit = "m",
-                    .initial = 0.02,
-                    .least = 1e-3,
-                    .meaning = "centres closer than this count as this far apart, so that costs stay finite"}},
+    .parameters =
+        {{.name = "target", .unit = "m^2", .initial = 5.0, .meaning = "w_s, over the target's squared distance"},
+         {.name = "pusher", .unit = "m^2", .initial = 1.0, .meaning = "w_p, over the pusher's squared distance"},
+         {.name = "nearest",
+          .unit = "m",
+          .initial = 0.02,
+          .least = 1e-3,
+          .meaning = "centres closer than this count as this far apart, so that costs stay finite"}},
     .running = [](const Step& s, Values v) {
       return obstacle_cost(s.geometry, s.x1, {.target = v[0], .pusher = v[1], .nearest = v[2]});
     }};
 
 // Eq. 6.10 has nothing of the kind: without it a plan through the obstacle that ends at the goal is a success.
-const TermKind kCollision{.name = "collision",
-                          .unit = "1",
-                          .weight = 20000.0,
-                          .meaning = "per step with the target, or the pusher, over the obstacle, and for each of them",
-                          .running = [](const Step& s, Values) -> double { return count_collisions(s.geometry, s.x1); }};
+const TermKind kCollision{
+    .name = "collision",
+    .unit = "1",
+    .weight = 20000.0,
+    .meaning = "per step with the target, or the pusher, over the obstacle, and for each of them",
+    .running = [](const Step& s, Values) -> double { return count_collisions(s.geometry, s.x1); }};
 
 const TermKind kIntrusion{.name = "intrusion",
                           .unit = "1",
@@ -128,8 +130,9 @@ const TermKind kObstruction{
 
 // Sums are made in this order: it is part of the last bit of every cost.
 std::vector<const TermKind*>& catalogue() {
-  static std::vector<const TermKind*> kinds{&kAcceleration, &kDisturbance, &kEdge,      &kTopple,  &kDrop, &kObstacle,
-                                            &kCollision,    &kIntrusion,   &kContact,   &kGoal,    &kObstruction};
+  static std::vector<const TermKind*> kinds{&kAcceleration, &kDisturbance, &kEdge,       &kTopple,
+                                            &kDrop,         &kObstacle,    &kCollision,  &kIntrusion,
+                                            &kContact,      &kGoal,        &kObstruction};
   return kinds;
 }
 
@@ -189,7 +192,8 @@ double& Objective::value(std::string_view kind, std::string_view parameter) {
 }
 
 Result<void> validate(const Objective& objective) {
-  const auto check = [](const std::string& field, double value, const char* unit, double least, double most) -> Result<void> {
+  const auto check = [](const std::string& field, double value, const char* unit, double least,
+                        double most) -> Result<void> {
     if (value >= least && value <= most && std::isfinite(value)) return {};
     std::string wanted = fmt::format("a finite number >= {}", least);
     if (most < std::numeric_limits<double>::max()) wanted += fmt::format(" and <= {:.4g}", most);

@@ -32,14 +32,14 @@ struct TermKind {
   double (*final)(const TaskGeometry& geometry, const State& x, std::span<const double> values) = nullptr;
 };
 
-/// All kinds in the order in which costs are summed.
+/// Returns all kinds, in the order in which costs are summed.
 std::span<const TermKind* const> term_catalogue();
 
-/// Null if there is none of that name.
+/// Finds a kind by its name; null if there is none.
 const TermKind* find_term_kind(std::string_view name);
 
-/// Adds a kind at the end, for programs that bring terms of their own: before they make an objective or a pool, from
-/// one thread. `kind` outlives the program's objectives.
+/// Adds a kind at the end, for programs that bring terms of their own. Call it from one thread, before any objective
+/// or pool is made. `kind` outlives the program's objectives.
 void add_term_kind(const TermKind& kind);
 
 }  // namespace jostle::physics_pool

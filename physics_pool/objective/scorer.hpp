@@ -15,11 +15,11 @@ class Scorer {
  public:
   explicit Scorer(const Objective& objective);
 
-  /// Sum of the running terms of one control step. Where Eq. 6.10 leaves x_N to the final cost alone, here
+  /// Returns the sum of the running terms of one control step. Eq. 6.10 leaves x_N to the final cost alone; here
   /// every step counts. Allocates nothing.
   double running(const Step& step) const;
 
-  /// What a rollout that ends at x pays there.
+  /// Returns the sum of the final terms: what a rollout that ends at x pays there.
   double final(const TaskGeometry& geometry, const State& x) const;
 
   /// Whether the task's goal is reached: the target is where it is to be, has not dropped and does not lean.
@@ -31,7 +31,7 @@ class Scorer {
     double weight;
     const std::vector<double>* values;
   };
-  bool stands(const TaskGeometry& geometry, const State& x) const;  // the target
+  bool stands(const TaskGeometry& geometry, const State& x) const;  // whether the target does: not dropped, not leaning
 
   friend std::optional<bool> object_in_hand(const TaskGeometry& geometry, const State& x);
 
@@ -39,11 +39,11 @@ class Scorer {
   double drop_height_, topple_angle_;  // m, rad
 };
 
-/// What the sensor of a simulated hand tells: whether the target is in its pre-grasp region, has not dropped and does
-/// not lean; nothing where there is no hand.
+/// Returns what the sensor of a simulated hand tells: whether the target is in its pre-grasp region, has not dropped
+/// and does not lean; nothing where there is no hand.
 std::optional<bool> object_in_hand(const TaskGeometry& geometry, const State& x);
 
-/// Scorer::at_goal of an objective that is used once.
+/// Does the same as Scorer::at_goal, for an objective that is used once.
 bool at_goal(const TaskGeometry& geometry, const State& x, const Objective& objective);
 
 }  // namespace jostle::physics_pool

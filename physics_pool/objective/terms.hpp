@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// The measures behind the terms of Eq. 3.2 and 6.10, each a small function of states at the borders of a control
-/// step. Engine-free. What a task does not have is 0 for it: obstructions without a hand, an obstacle where there
+/// step. Engine-free. What a task does not have costs 0: obstructions without a hand, an obstacle where there
 /// is none.
 
 #include <span>
@@ -10,10 +10,10 @@
 
 namespace jostle::physics_pool {
 
-/// c_a(u_before, u) = |u - u_before|^2
+/// Returns c_a(u_before, u) = |u - u_before|^2.
 double acceleration_cost(std::span<const double> u_before, std::span<const double> u);
 
-/// c_d(x0, x1) = sum over the objects but the target of |dp|^2 + w·|rotation|^2
+/// Returns c_d(x0, x1) = sum over the objects but the target of |dp|^2 + w·|rotation|^2.
 double disturbance_cost(const TaskGeometry& geometry, const State& x0, const State& x1, double rotation_weight);
 
 struct EdgeCost {
@@ -22,7 +22,7 @@ struct EdgeCost {
   double margin = 0.05;       ///< m; the safe zone is the surface less this much along its border
 };
 
-/// c_e(x0, x1) = sum of exp(min(k·d_E, cap)) over all objects outside the safe
+/// Returns c_e(x0, x1) = sum of exp(min(k·d_E, cap)) over all objects outside the safe
 /// zone at x1, where d_E is how far the object moved from x0 to x1.
 double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1, const EdgeCost& edge);
 
@@ -32,7 +32,8 @@ struct ObstacleCost {
   double nearest = 0.02;  ///< m; centres closer than this count as this far apart: costs stay finite
 };
 
-/// w_s/|p_T - p_O|^2 + w_p/|p_P - p_O|^2 of target T, pusher P and obstacle O (Eq. 6.10); 0 without an obstacle.
+/// Returns w_s/|p_T - p_O|^2 + w_p/|p_P - p_O|^2 for target T, pusher P and obstacle O (Eq. 6.10); 0 without an
+/// obstacle.
 double obstacle_cost(const TaskGeometry& geometry, const State& x, const ObstacleCost& obstacle);
 
 }  // namespace jostle::physics_pool

@@ -19,11 +19,13 @@ struct PararealStop {
   bool adaptive = false;
   double translation_mm = 8.10;  ///< defaults: how repeatable real pushes are
   double rotation_deg = 4.20;    ///< (Yu et al., IROS 2016; Table 6.1)
-  /// Of PlanarUpdate::correct; infinity is Eq. 6.3 to the letter.
+  /// The `limit` of PlanarUpdate::correct; infinity is Eq. 6.3 to the letter.
   double correction_limit = std::numeric_limits<double>::infinity();
 };
 
-/// x_{n+1}^{k+1} = C(x_n^{k+1}, u_n) + F(x_n^k, u_n) - C(x_n^k, u_n)     (6.3)
+/// Iterates
+///
+///   x_{n+1}^{k+1} = C(x_n^{k+1}, u_n) + F(x_n^k, u_n) - C(x_n^k, u_n)     (6.3)
 ///
 /// as a table of levels k = 0 … K and times n = 0 … N that is filled in as results of F
 /// arrive, in whatever order: an entry is made as soon as the one before it and
@@ -47,24 +49,24 @@ class PararealIteration {
   PararealIteration(const PlanarUpdate& update, CoarseModel& coarse, State x0, ControlSequence controls,
                     double duration, const PararealStop& stop);
 
-  /// Level 0 is made step by step, so that C may serve many trajectories at once: N times
-  /// `next_start` gives where C is to start from, and `guess` takes where it came to.
+  /// Level 0 is made step by step, so that C may serve many trajectories at once: N times,
+  /// `next_start` gives the state that C is to start from, and `guess` takes the state that C came to.
   void next_start(std::span<double> planar) const;
   void guess(std::span<const double> planar);
 
   /// Slices that may run and were not handed out before.
   std::vector<Slice> take_ready() { return std::exchange(ready_, {}); }
 
-  /// F has run.
+  /// Takes the end of a slice that F has run.
   void complete(int slice, State end);
 
   bool done() const { return final_level_.has_value(); }
   int iterations() const { return *final_level_; }  ///< k of states(); once done
-  /// x_0 … x_N after the last iteration, once done; or after k of them.
+  /// Returns x_0 … x_N after the last iteration, once done; or after k iterations.
   const std::vector<State>& states() const { return states(*final_level_); }
   const std::vector<State>& states(int k) const { return levels_[static_cast<std::size_t>(k)].states; }
 
-  /// Empty, or which prediction of the coarse model is of no use.
+  /// Says which prediction of the coarse model is not finite; empty if none.
   const std::string& problem() const { return problem_; }
 
  private:

@@ -10,14 +10,14 @@
 
 namespace jostle::physics_pool {
 
-/// F(start, u) as a batch of one rollout of one step; world, step duration and fidelity
-/// are those of `of`.
+/// Describes F(start, u) as a batch of one rollout of one step. It takes world, step duration and fidelity
+/// from the batch `of`.
 RolloutBatch slice_batch(const RolloutBatch& of, const State& start, std::span<const double> u);
 
-/// The trajectories of k = 0 … N iterations for the nominal controls of a batch, one
+/// Predicts the trajectories of k = 0 … N iterations for the nominal controls of a batch, one
 /// slice after the other on `pool`. The last one is the serial fine model's.
 /// Errors   those of Pool::run
-///          kInternal  a slice diverged, or the coarse model lost itself; says why
+///          kInternal  a slice diverged, or a coarse prediction is not finite; says why
 Result<std::vector<Trajectory>> predict_levels(Pool& pool, const RolloutBatch& batch, const PlanarUpdate& update,
                                                CoarseModel& coarse, TimePoint deadline, std::stop_token stop = {},
                                                double correction_limit = PararealStop{}.correction_limit);

@@ -18,10 +18,10 @@
 namespace jostle::physics_pool {
 
 struct PararealOptions {
-  std::string model = "planar";  ///< of make_coarse_model
+  std::string model = "planar";  ///< a name that make_coarse_model takes
   PararealStop stop;             ///< iterations 0 predicts with the coarse model alone
   /// Chooses per batch between whole rollouts and slices (split.hpp), from measured times.
-  /// What is chosen depends on the machine, so plans repeat bit for bit only without.
+  /// The choice depends on the machine, so plans repeat bit for bit only when this is off.
   bool split_by_itself = false;
   /// Hears of every choice that differs from the one before.
   std::function<void(const std::string& why)> on_split;
@@ -36,10 +36,10 @@ struct PararealOptions {
 /// Threads  safe from any thread.
 /// Repeats  as Pool: replies do not depend on the workers, their number or loss. A
 ///          success ends a batch early (samples above it are skipped); losers run to
-///          their ends, for their cost is known last. A batch that waits instead of
+///          their ends, because their cost is known only then. A batch that waits instead of
 ///          simulating is passed on.
 /// Errors   those of the pool underneath, and of make_coarse_model when a world is
-///          loaded. A slice that diverges, or a coarse model that loses itself, ends
+///          loaded. A slice that diverges, or a coarse prediction that is not finite, ends
 ///          its sample as kDiverged, with the reason.
 class PararealPool final : public Pool {
  public:

@@ -10,16 +10,16 @@
 
 namespace jostle::physics_pool {
 
-/// What coarse models know lies in the plane; height and tilt of a slider are always
-/// those of the state that is corrected. Poses are updated in tangent space: a
-/// slider is moved and turned about the vertical, its quaternion stays one.
+/// A PlanarUpdate carries coarse predictions over to full states. Coarse models know only the plane; a slider keeps
+/// height and tilt of the state that is corrected. Poses are updated in tangent space: a
+/// slider is moved and turned about the vertical, so its quaternion stays a unit one.
 ///
 /// Threads  immutable; safe from any.
 class PlanarUpdate {
  public:
   explicit PlanarUpdate(const Scene& scene);
 
-  /// x takes on a planar state: a coarse prediction becomes a full state. A slider
+  /// Puts a planar state into x: a coarse prediction becomes a full state. A slider
   /// whose centre is beyond the surface's edge is put below it: it has fallen.
   void replace(State& x, std::span<const double> planar) const;
 
@@ -28,10 +28,10 @@ class PlanarUpdate {
     std::span<const double> start, end;
   };
 
-  /// x + (C(now) - C(before)): Eq. 6.3, where x is F(x_n^k), and C was applied to
+  /// Adds C(now) - C(before) to x: Eq. 6.3, where x is F(x_n^k), and C was applied to
   /// x_n^{k+1} now and to x_n^k before. No slider is corrected by more than `limit` times
-  /// the change of what C began with, its own and the pusher's: where one start
-  /// touches and the other does not, C jumps by a whole push, and F does not.
+  /// the difference of C's two starts, that of the slider and that of the pusher: where the pusher touches in
+  /// one start and not in the other, C jumps by a whole push, and F does not.
   void correct(State& x, const Step& now, const Step& before, double limit) const;
 
   /// Moves sliders, as little as it takes, until none is deeper in the pusher or in

@@ -14,7 +14,7 @@
 
 namespace jostle::physics_pool {
 
-/// An OpenGL context in main memory and MuJoCo's resources in it. Needs neither
+/// A Canvas is an OpenGL context in main memory, with MuJoCo's resources in it. It needs neither
 /// a display nor a graphics card. Everything is drawn `kOversampling` times as
 /// wide and high and averaged, which smooths edges and letters.
 ///
@@ -33,7 +33,7 @@ class Canvas {
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
 
-  /// The whole surface, and what to draw with; valid only during `draw`.
+  /// Draws on `area`, the whole surface, with `context`; both are valid only during the call.
   using Draw = std::function<void(mjrRect area, const mjrContext& context)>;
 
   /// Error kInternal: the engine refused to draw; says why.

@@ -2,10 +2,8 @@
 
 #include <array>
 
-
 namespace jostle::physics_pool {
 namespace {
-
 
 using Vector = std::array<mjtNum, 3>;
 using Colour = std::array<float, 4>;
@@ -75,7 +73,8 @@ void add_disc(const Disc& disc, double height, const Colour& colour, mjvScene& s
 }  // namespace
 
 void decorate(const SceneTask& task, const mjModel& model, const mjData& data, mjvScene& scene) {
-  if (const TaskKind* kind = find_task_kind(task.kind); kind && kind->has_goal) add_disc(task.goal, 0.001, kGoalColour, scene);
+  if (const TaskKind* kind = find_task_kind(task.kind); kind && kind->has_goal)
+    add_disc(task.goal, 0.001, kGoalColour, scene);
   if (task.obstacle) add_disc(*task.obstacle, 0.002, kObstacleColour, scene);
   for (const char* part : {"palm", "arm", "finger_left", "finger_right"}) {
     if (mj_name2id(&model, mjOBJ_GEOM, part) < 0) return;

@@ -21,7 +21,7 @@ struct Picture {
   bool operator==(const Picture&) const = default;
 };
 
-/// A picture of one colour.
+/// Makes a picture of one shade of grey.
 Picture blank_picture(int width, int height, std::uint8_t grey);
 
 /// Copies `part` into `whole` with its top left corner at (x, y). Our own bug

@@ -42,7 +42,7 @@ class Renderer {
   std::unique_ptr<Parts> parts_;
 };
 
-/// One picture of one state.
+/// Draws one picture of one state.
 Result<Picture> render(const Scene& scene, const State& state, const RenderOptions& options);
 
 }  // namespace jostle::physics_pool

@@ -9,13 +9,14 @@
 
 namespace jostle::physics_pool {
 
-/// X_WL of a link. `base` is X_WB, `q` [joints].
-Eigen::Isometry3d link_pose(const RobotModel& model, const Eigen::Isometry3d& base, std::span<const double> q, int link);
+/// Returns X_WL of a link. `base` is X_WB, `q` [joints].
+Eigen::Isometry3d link_pose(const RobotModel& model, const Eigen::Isometry3d& base, std::span<const double> q,
+                            int link);
 
-/// X_WT of the tool: the hand's frame G where there is a hand, else the last link's.
+/// Returns X_WT of the tool: the hand's frame G where there is a hand, else the last link's.
 Eigen::Isometry3d tool_pose(const RobotModel& model, const Eigen::Isometry3d& base, std::span<const double> q);
 
-/// |u|, m/s: the Euclidean norm over axes, of which those that turn joints count with a lever of 0.1 m.
+/// Returns |u|, m/s: the Euclidean norm over axes. An axis that turns joints counts with a lever of 0.1 m.
 double control_norm(const RobotModel& model, std::span<const double> u);
 
 }  // namespace jostle::physics_pool

@@ -25,9 +25,7 @@ int axis_of(const RobotModel& model, int joint) {
   return -1;
 }
 
-bool is_unit(const std::array<double, 3>& v) {
-  return std::abs(v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - 1) < 1e-6;
-}
+bool is_unit(const std::array<double, 3>& v) { return std::abs(v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - 1) < 1e-6; }
 bool is_unit(const std::array<double, 4>& q) {
   return std::abs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1) < 1e-6;
 }
@@ -50,10 +48,11 @@ Result<void> check_joint(const std::string& at, const Joint& joint) {
   if (joint.is_limited() && !std::isfinite(joint.low)) return wrong(at + ".range", joint.low, "two finite numbers");
   if (!(joint.armature >= 0 && joint.armature <= 1e6)) return wrong(at + ".armature", joint.armature, "0 to 1e6");
   if (!(joint.gain >= 0 && joint.gain * kStep <= kDriveRatio * std::max(joint.armature, 1e-9))) {
-    return wrong(at + ".gain", joint.gain,
-                 fmt::format("0 to {:g}, {} times the armature of {} over {} s: above it the drive overshoots; raise the "
-                             "armature",
-                             kDriveRatio * joint.armature / kStep, kDriveRatio, joint.armature, kStep));
+    return wrong(
+        at + ".gain", joint.gain,
+        fmt::format("0 to {:g}, {} times the armature of {} over {} s: above it the drive overshoots; raise the "
+                    "armature",
+                    kDriveRatio * joint.armature / kStep, kDriveRatio, joint.armature, kStep));
   }
   if (joint.gain > 0 && !(joint.force_limit > 0)) return wrong(at + ".force_limit", joint.force_limit, "more than 0");
   if (!(joint.start >= joint.low && joint.start <= joint.high)) {
@@ -80,15 +79,18 @@ Result<void> check_geom(const std::string& at, const RobotGeom& geom) {
     if (auto ok = size(".height", geom.height); !ok) return ok;
   }
   if (geom.shape == GeomShape::kMesh && (geom.vertices.size() < 12 || geom.vertices.size() % 3 != 0)) {
-    return invalid(at + ".vertices", fmt::format("{} numbers", geom.vertices.size()), "three for each of 4 points or more");
+    return invalid(at + ".vertices", fmt::format("{} numbers", geom.vertices.size()),
+                   "three for each of 4 points or more");
   }
   if (std::ranges::any_of(geom.vertices, [](double value) { return !(std::abs(value) <= kMost); })) {
     return invalid(at + ".vertices", "a number that is not finite, or too large", fmt::format("-{0} to {0} m", kMost));
   }
   if (!(geom.mass >= 0 && geom.mass <= 1000)) return wrong(at + ".mass", geom.mass, "0 to 1000 kg");
-  if (!is_finite(geom.pose)) return invalid(at + ".pose", "numbers that are no pose", "finite ones and a unit quaternion");
+  if (!is_finite(geom.pose))
+    return invalid(at + ".pose", "numbers that are no pose", "finite ones and a unit quaternion");
   static const std::set<std::string> kMaterials{"arm", "dark", "steel"};
-  if (!kMaterials.contains(geom.material)) return invalid(at + ".material", "'" + geom.material + "'", "arm, dark or steel");
+  if (!kMaterials.contains(geom.material))
+    return invalid(at + ".material", "'" + geom.material + "'", "arm, dark or steel");
   return {};
 }
 
@@ -153,16 +155,19 @@ Result<void> validate(const RobotModel& model) {
   for (std::size_t i = 0; i < model.links.size(); ++i) {
     const Link& link = model.links[i];
     const std::string at = fmt::format("robot.links[{}] ('{}')", i, link.name);
-    if (link.name.empty() || !names.insert(link.name).second) return invalid(at + ".name", "'" + link.name + "'", "a name of its own");
+    if (link.name.empty() || !names.insert(link.name).second)
+      return invalid(at + ".name", "'" + link.name + "'", "a name of its own");
     if (link.parent < -1 || link.parent >= static_cast<int>(i)) {
       return wrong(at + ".parent", link.parent, "an earlier link, or -1");
     }
-    if (!is_finite(link.pose)) return invalid(at + ".pose", "numbers that are no pose", "finite ones and a unit quaternion");
+    if (!is_finite(link.pose))
+      return invalid(at + ".pose", "numbers that are no pose", "finite ones and a unit quaternion");
     if (link.inertia && !(link.inertia->mass > 0 && is_finite(link.inertia->pose))) {
       return wrong(at + ".inertia.mass", link.inertia->mass, "more than 0 kg");
     }
     for (const int joint : link.joints) {
-      if (!in_range(joint, model.joints.size())) return wrong(at + ".joints", joint, fmt::format("0 to {}", model.joints.size() - 1));
+      if (!in_range(joint, model.joints.size()))
+        return wrong(at + ".joints", joint, fmt::format("0 to {}", model.joints.size() - 1));
       ++uses[static_cast<std::size_t>(joint)];
     }
     for (std::size_t k = 0; k < link.geoms.size(); ++k) {
@@ -190,14 +195,18 @@ Result<void> validate(const RobotModel& model) {
   for (std::size_t i = 0; i < model.axes.size(); ++i) {
     const Axis& axis = model.axes[i];
     const std::string at = fmt::format("robot.axes[{}] ('{}')", i, axis.name);
-    if (axis.name.empty() || !names.insert(axis.name).second) return invalid(at + ".name", "'" + axis.name + "'", "a name of its own");
+    if (axis.name.empty() || !names.insert(axis.name).second)
+      return invalid(at + ".name", "'" + axis.name + "'", "a name of its own");
     if (axis.joints.empty()) return invalid(at + ".joints", "none", "one at least");
     if (!(axis.limit > 0 && std::isfinite(axis.limit))) return wrong(at + ".limit", axis.limit, "more than 0");
     for (const auto& [joint, factor] : axis.joints) {
-      if (!in_range(joint, model.joints.size())) return wrong(at + ".joints", joint, fmt::format("0 to {}", model.joints.size() - 1));
-      if (!std::isfinite(factor) || factor == 0) return wrong(at + ".joints", factor, "a factor that is finite and not 0");
+      if (!in_range(joint, model.joints.size()))
+        return wrong(at + ".joints", joint, fmt::format("0 to {}", model.joints.size() - 1));
+      if (!std::isfinite(factor) || factor == 0)
+        return wrong(at + ".joints", factor, "a factor that is finite and not 0");
       if (!(model.joints[static_cast<std::size_t>(joint)].gain > 0)) {
-        return invalid(at + ".joints", "'" + model.joints[static_cast<std::size_t>(joint)].name + "', which has no drive",
+        return invalid(at + ".joints",
+                       "'" + model.joints[static_cast<std::size_t>(joint)].name + "', which has no drive",
                        "joints with a gain");
       }
     }
@@ -211,7 +220,8 @@ Result<void> validate(const RobotModel& model) {
   if (!in_range(hand.opening, model.axes.size())) return wrong("robot.hand.opening", hand.opening, "an axis");
   if (!(hand.near >= 0 && hand.far > hand.near && hand.side > 0 && hand.depth > 0 && hand.finger_length > 0 &&
         hand.stroke > 0 && hand.stroke < 10)) {
-    return invalid("robot.hand", "measures that do not fit", "0 <= near < far; side, depth, finger_length, stroke > 0 m");
+    return invalid("robot.hand", "measures that do not fit",
+                   "0 <= near < far; side, depth, finger_length, stroke > 0 m");
   }
   return {};
 }

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Robots as data: links, joints, drives, and what of them a control moves. Engine-free.
+/// Robots as data: links, joints, drives, and which joints a control moves. Engine-free.
 
 #include <array>
 #include <limits>
@@ -39,17 +39,17 @@ enum class GeomShape { kBox, kCylinder, kSphere, kMesh };
 struct RobotGeom {
   std::string name;
   GeomShape shape = GeomShape::kBox;
-  std::array<double, 3> size{};      ///< box: full extents x, y, z, m
+  std::array<double, 3> size{};       ///< box: full extents x, y, z, m
   double radius = 0.0, height = 0.0;  ///< cylinder and sphere, m
-  std::vector<double> vertices;      ///< mesh: [n][3], m; its convex hull is what touches
-  Pose pose;                         ///< X_LG, in the link
-  double mass = 0.0;                 ///< kg; 0 where the link has its inertia
-  std::string material = "steel";    ///< steel, dark or arm: pictures only
+  std::vector<double> vertices;       ///< mesh: [n][3], m; its convex hull is what touches
+  Pose pose;                          ///< X_LG, in the link
+  double mass = 0.0;                  ///< kg; 0 where the link has its inertia
+  std::string material = "steel";     ///< steel, dark or arm: pictures only
 
   bool operator==(const RobotGeom&) const = default;
 };
 
-/// Of a link whose inertia does not follow from its geoms.
+/// The inertia of a link where it does not follow from the link's geoms.
 struct Inertia {
   double mass = 0.0;                ///< kg
   Pose pose;                        ///< centre of mass, and the frame of `moments`
@@ -80,18 +80,18 @@ struct Axis {
   bool operator==(const Axis&) const = default;
 };
 
-/// What grasps: two fingers that close along y, in frame G on a link, x forward. An object is in the hand
+/// A hand grasps with two fingers that close along y, in frame G on a link, x forward. An object is in the hand
 /// when its centre is in the pre-grasp region.
 struct Hand {
   int link = 0;
-  Pose pose;                         ///< X_LG
-  double near = 0.0, far = 0.0;      ///< m ahead of G, the pre-grasp region
-  double side = 0.0;                 ///< m either side of its middle
-  double depth = 0.0;                ///< m ahead of G, where approaches aim to have the target
-  double finger_length = 0.0;        ///< m
-  double stroke = 0.0;               ///< m, largest opening
-  int left = 0, right = 0;           ///< joints of the fingers; their positions are distances from the middle, m
-  int opening = 0;                   ///< the axis that moves both
+  Pose pose;                     ///< X_LG
+  double near = 0.0, far = 0.0;  ///< m ahead of G, the pre-grasp region
+  double side = 0.0;             ///< m either side of its middle
+  double depth = 0.0;            ///< m ahead of G, where approaches aim to have the target
+  double finger_length = 0.0;    ///< m
+  double stroke = 0.0;           ///< m, largest opening
+  int left = 0, right = 0;       ///< joints of the fingers; their positions are distances from the middle, m
+  int opening = 0;               ///< the axis that moves both
 
   bool operator==(const Hand&) const = default;
 };
@@ -102,7 +102,7 @@ struct RobotModel {
   std::vector<Joint> joints;  ///< in the order of q
   std::vector<Axis> axes;     ///< in the order of u
   std::optional<Hand> hand;
-  /// Drives carry the robot's own weight, as controllers of arms do.
+  /// Whether the drives carry the robot's own weight, as controllers of arms do.
   bool carries_itself = false;
 
   bool operator==(const RobotModel&) const = default;
@@ -116,17 +116,17 @@ struct PlanarRobot {
   int rotation = -1;  ///< axis of u, or -1: it has no heading
 };
 
-/// Whether a robot is one, by its joints.
+/// Says how a robot moves in the plane, if its joints make it a planar one.
 std::optional<PlanarRobot> as_planar(const RobotModel& model);
 
-/// A planar robot that is nothing but an upright cylinder: its radius, m.
+/// Returns the radius, m, of a planar robot that is nothing but an upright cylinder; nothing for other robots.
 std::optional<double> disc_radius(const RobotModel& model);
 
-/// Axis::limit of every axis, in the order of u.
+/// Returns Axis::limit of every axis, in the order of u.
 std::vector<double> axis_limits(const RobotModel& model);
 
-/// Names unique, indices in range, parents before children, axes of length 1, masses and sizes sensible, and what
-/// is driven stable with steps of 2 ms: gain·0.002 at most half the armature.
+/// Checks that names are unique, indices in range, parents before children, axes of length 1, masses and sizes
+/// sensible, and driven joints stable with steps of 2 ms: gain·0.002 at most half the armature.
 /// Error kInvalidArgument: "robot.joints[2] ('elbow').gain: got …, wanted …".
 Result<void> validate(const RobotModel& model);
 

@@ -20,10 +20,10 @@ namespace fs = std::filesystem;
 
 // A drive's inertia follows from its strength: at full effort it gains so much speed per second. Its gain makes
 // it reach a speed in 10 ms, which is stable with steps of 2 ms.
-constexpr double kAcceleration = 150.0;     // rad/s^2 or m/s^2
-constexpr double kLeastArmature = 0.05;     // kg m^2 or kg
-constexpr double kGainOfArmature = 100.0;   // 1/s
-constexpr double kFastestJoint = 100.0;     // rad/s or m/s, where a file gives no sensible limit
+constexpr double kAcceleration = 150.0;    // rad/s^2 or m/s^2
+constexpr double kLeastArmature = 0.05;    // kg m^2 or kg
+constexpr double kGainOfArmature = 100.0;  // 1/s
+constexpr double kFastestJoint = 100.0;    // rad/s or m/s, where a file gives no sensible limit
 
 Pose from_urdf(const urdf::Pose& pose) {
   return {.position = {pose.position.x, pose.position.y, pose.position.z},
@@ -39,14 +39,16 @@ class Reader {
       throw yaml::Malformed{fmt::format("{}:{}: not XML: {}", origin, document.ErrorLineNum(), document.ErrorStr())};
     }
     const tinyxml2::XMLElement* robot = document.FirstChildElement("robot");
-    if (!robot) throw yaml::Malformed{origin + ":1: got no <robot>, wanted a URDF file; remedy: run xacro on .xacro files"};
+    if (!robot)
+      throw yaml::Malformed{origin + ":1: got no <robot>, wanted a URDF file; remedy: run xacro on .xacro files"};
     for (const auto* e = robot->FirstChildElement(); e; e = e->NextSiblingElement()) {
       if (const char* name = e->Attribute("name")) lines_[{e->Name(), name}] = e->GetLineNum();
     }
     urdf_ = urdf::parseURDF(xml);
     if (!urdf_) {
-      throw yaml::Malformed{origin + ": the URDF parser refused it (its words are above); wanted links and joints that "
-                                     "make one tree"};
+      throw yaml::Malformed{origin +
+                            ": the URDF parser refused it (its words are above); wanted links and joints that "
+                            "make one tree"};
     }
   }
 
@@ -73,9 +75,10 @@ class Reader {
     }
     if (from.inertial) {
       const urdf::Inertial& inertial = *from.inertial;
-      link.inertia = Inertia{.mass = inertial.mass,
-                             .pose = from_urdf(inertial.origin),
-                             .moments = {inertial.ixx, inertial.iyy, inertial.izz, inertial.ixy, inertial.ixz, inertial.iyz}};
+      link.inertia =
+          Inertia{.mass = inertial.mass,
+                  .pose = from_urdf(inertial.origin),
+                  .moments = {inertial.ixx, inertial.iyy, inertial.izz, inertial.ixy, inertial.ixz, inertial.iyz}};
       if (!(inertial.mass > 0)) link.inertia.reset();
     }
     if (!link.joints.empty() && !link.inertia) {
@@ -102,9 +105,10 @@ class Reader {
         joint.kind = JointKind::kSlide;
         break;
       default:
-        refuse("joint", from.name,
-               "its type is not supported, wanted revolute, continuous, prismatic or fixed; remedy: write a planar joint "
-               "as two prismatic and a continuous one, and place a floating robot by robot.base of the scene");
+        refuse(
+            "joint", from.name,
+            "its type is not supported, wanted revolute, continuous, prismatic or fixed; remedy: write a planar joint "
+            "as two prismatic and a continuous one, and place a floating robot by robot.base of the scene");
     }
     const double length = std::hypot(from.axis.x, from.axis.y, from.axis.z);
     if (!(length > 0)) refuse("joint", from.name, "<axis>: got length 0, wanted a direction");
@@ -121,7 +125,8 @@ class Reader {
         }
       }
     }
-    if (!(effort > 0)) refuse("joint", from.name, fmt::format("<limit effort>: got {}, wanted more than 0 N or N m", effort));
+    if (!(effort > 0))
+      refuse("joint", from.name, fmt::format("<limit effort>: got {}, wanted more than 0 N or N m", effort));
     joint.armature = std::max(kLeastArmature, effort / kAcceleration);
     joint.gain = kGainOfArmature * joint.armature;
     joint.force_limit = effort;
@@ -144,7 +149,8 @@ class Reader {
       Joint& joint = model_.joints[static_cast<std::size_t>(follower)];
       const auto axis = std::ranges::find(model_.axes, mimic.joint_name, &Axis::name);
       if (axis == model_.axes.end()) {
-        refuse("joint", joint.name, fmt::format("<mimic joint>: got '{}', wanted a joint that moves by itself", mimic.joint_name));
+        refuse("joint", joint.name,
+               fmt::format("<mimic joint>: got '{}', wanted a joint that moves by itself", mimic.joint_name));
       }
       axis->joints.emplace_back(follower, mimic.multiplier);
       const Joint& leader = model_.joints[static_cast<std::size_t>(axis->joints[0].first)];
@@ -154,7 +160,9 @@ class Reader {
 
   void add_geom(const urdf::Link& from, const urdf::Collision& collision, Link& link) {
     if (!collision.geometry) return;
-    RobotGeom geom{.name = fmt::format("{}_{}", from.name, link.geoms.size()), .pose = from_urdf(collision.origin), .material = "arm"};
+    RobotGeom geom{.name = fmt::format("{}_{}", from.name, link.geoms.size()),
+                   .pose = from_urdf(collision.origin),
+                   .material = "arm"};
     switch (collision.geometry->type) {
       case urdf::Geometry::BOX: {
         const urdf::Vector3& size = static_cast<const urdf::Box&>(*collision.geometry).dim;
@@ -211,8 +219,9 @@ class Reader {
     std::vector<std::string> tried;
     for (const fs::path& candidate : candidates) tried.push_back(candidate.string());
     refuse("link", from.name,
-           fmt::format("<mesh filename=\"{}\">: no such file; looked for {}; JOSTLE_MODELS or ROS_PACKAGE_PATH add folders",
-                       name, fmt::join(tried, ", ")));
+           fmt::format(
+               "<mesh filename=\"{}\">: no such file; looked for {}; JOSTLE_MODELS or ROS_PACKAGE_PATH add folders",
+               name, fmt::join(tried, ", ")));
   }
 
   const std::string& origin_;
@@ -228,7 +237,8 @@ class Reader {
 Result<RobotModel> parse_urdf(const std::string& xml, const std::string& origin, const RobotPath& path) {
   try {
     RobotModel model = Reader(xml, origin, path).read();
-    if (auto ok = validate(model); !ok) return Error{ok.error().code, fmt::format("{}: {}", origin, ok.error().message)};
+    if (auto ok = validate(model); !ok)
+      return Error{ok.error().code, fmt::format("{}: {}", origin, ok.error().message)};
     return model;
   } catch (const yaml::Malformed& malformed) {
     return Error{Code::kInvalidArgument, malformed.message};

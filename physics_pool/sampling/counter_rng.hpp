@@ -21,17 +21,17 @@ inline constexpr std::uint32_t kSamplingStreams = 0x9000;
 
 /// Names one draw. Two draws with different indices are independent.
 struct DrawIndex {
-  Purpose purpose = Purpose::kControls;
   std::uint32_t stream = 0;
   std::uint32_t sample = 0;
   std::uint32_t step = 0;
   std::uint32_t axis = 0;  ///< less than 2^24
+  Purpose purpose = Purpose::kControls;
 };
 
-/// One standard normal number (Box-Muller).
+/// Draws one standard normal number (Box-Muller).
 double standard_normal(std::uint64_t seed, const DrawIndex& index);
 
-/// One number uniform in (0, 1).
+/// Draws one number, uniform in (0, 1).
 double standard_uniform(std::uint64_t seed, const DrawIndex& index);
 
 /// Draws one after the other from one stream, for generators that think in

@@ -17,13 +17,13 @@ struct GeneratePushOptions {
   std::string integrator = "euler";  ///< or "rk4"
 };
 
-/// One slider, the pusher 1 to 2 cm behind it as seen from the goal region, and an
-/// obstacle halfway in between, so that the straight push runs into it (Sec. 6.2).
+/// Makes a world of one slider, the pusher 1 to 2 cm behind it as seen from the goal region, and an
+/// obstacle halfway to that region, so that the straight push runs into it (Sec. 6.2).
 /// `scenes/README.md` gives the measures and their reasons.
 /// Errors   kInvalidArgument  an unknown integrator
 Result<Scene> generate_chapter6(const GeneratePushOptions& options);
 
-/// The same without the obstacle, with other sliders near the way (Sec. 7.1.1). None
+/// Makes the same without the obstacle, with other sliders near the target's way (Sec. 7.1.1). None
 /// starts so near the goal region that the target could not be in it.
 /// Errors   kInvalidArgument  objects out of range, an unknown integrator
 Result<Scene> generate_chapter7(const GeneratePushOptions& options);

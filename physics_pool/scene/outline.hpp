@@ -19,14 +19,14 @@ inline Outline outline(const SceneObject& object) {
   return {.half_x = object.size[0] / 2, .half_y = object.size[1] / 2};
 }
 
-/// The point of an outline's border nearest to a point: how far away, and the
+/// How far a point is from the nearest point of an outline's border, and the
 /// outward normal there. Inside, the distance is negative.
 struct Nearest {
   double distance = 0.0;  // m
   double normal_x = 1.0, normal_y = 0.0;
 };
 
-/// Of (x, y) in the outline's frame.
+/// Finds it for the point (x, y) in the outline's frame.
 inline Nearest nearest(const Outline& outline, double x, double y) {
   if (outline.radius > 0) {
     const double range = std::hypot(x, y);

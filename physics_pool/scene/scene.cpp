@@ -64,7 +64,7 @@ std::optional<Footprint> footprint(const Fixture& fixture, double height) {
   return Footprint{.x = centre.x(), .y = centre.y(), .outline = {.half_x = reach.x(), .half_y = reach.y()}};
 }
 
-// Of a robot that moves in the plane; empty for others.
+// The footprint of a robot that moves in the plane; empty for others.
 std::vector<Footprint> footprint(const SceneRobot& robot) {
   std::vector<Footprint> parts;
   if (!as_planar(robot.model)) return parts;
@@ -158,10 +158,11 @@ Result<void> check_surface(const Surface& surface, const Locate& locate) {
       constexpr double kTouch = 1e-9;  // m; parts that share a side do not overlap
       if (std::min(part.high_x(), other.high_x()) - std::max(part.low_x(), other.low_x()) > kTouch &&
           std::min(part.high_y(), other.high_y()) - std::max(part.low_y(), other.low_y()) > kTouch) {
-        return invalid(locate, {field, field},
-                       fmt::format("overlaps part {}, wanted parts that meet at their sides: what stands on two would be "
-                                   "held up twice",
-                                   k));
+        return invalid(
+            locate, {field, field},
+            fmt::format("overlaps part {}, wanted parts that meet at their sides: what stands on two would be "
+                        "held up twice",
+                        k));
       }
     }
   }
@@ -169,14 +170,16 @@ Result<void> check_surface(const Surface& surface, const Locate& locate) {
 }
 
 Result<void> check_fixture(const Fixture& fixture, const Field& parent, const Locate& locate) {
-  if (fixture.name.empty()) return invalid(locate, {parent.path + "name", parent.shown + "name"}, "got '', wanted a name");
-  auto sizes = fixture.shape == Shape::kBox
-                   ? check(locate, parent,
-                           {{"size[0]", fixture.size[0], kSmallest, 10, "m"},
-                            {"size[1]", fixture.size[1], kSmallest, 10, "m"},
-                            {"size[2]", fixture.size[2], kSmallest, 10, "m"}})
-                   : check(locate, parent,
-                           {{"radius", fixture.radius, kSmallest, 10, "m"}, {"height", fixture.height, kSmallest, 10, "m"}});
+  if (fixture.name.empty())
+    return invalid(locate, {parent.path + "name", parent.shown + "name"}, "got '', wanted a name");
+  auto sizes =
+      fixture.shape == Shape::kBox
+          ? check(locate, parent,
+                  {{"size[0]", fixture.size[0], kSmallest, 10, "m"},
+                   {"size[1]", fixture.size[1], kSmallest, 10, "m"},
+                   {"size[2]", fixture.size[2], kSmallest, 10, "m"}})
+          : check(locate, parent,
+                  {{"radius", fixture.radius, kSmallest, 10, "m"}, {"height", fixture.height, kSmallest, 10, "m"}});
   if (!sizes) return sizes;
   const auto& [p, q] = fixture.pose;
   const double length = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
@@ -190,7 +193,8 @@ Result<void> check_fixture(const Fixture& fixture, const Field& parent, const Lo
 Result<void> check_robot(const SceneRobot& robot, const Locate& locate) {
   if (auto ok = validate(robot.model); !ok) {
     const std::string& message = ok.error().message;  // "robot.links[2]…: got …"
-    return Error{ok.error().code, fmt::format("{}: {}", locate(message.substr(0, message.find_first_of("[:"))), message)};
+    return Error{ok.error().code,
+                 fmt::format("{}: {}", locate(message.substr(0, message.find_first_of("[:"))), message)};
   }
   const auto& [p, orientation] = robot.base;
   double length = 0.0;
@@ -204,8 +208,9 @@ Result<void> check_robot(const SceneRobot& robot, const Locate& locate) {
     return ok;
   }
   if (as_planar(robot.model) && !(robot.base == Pose{})) {
-    return invalid(locate, {"robot.base", "robot.base"},
-                   "got a pose for a robot that moves in the surface's plane, wanted none: robot.start says where it is");
+    return invalid(
+        locate, {"robot.base", "robot.base"},
+        "got a pose for a robot that moves in the surface's plane, wanted none: robot.start says where it is");
   }
   if (robot.q.size() != robot.model.joints.size()) {
     return invalid(locate, {"robot.start", "robot.start"},
@@ -253,7 +258,8 @@ const RobotModel& builtin(const char* name) {
 }  // namespace
 
 SceneRobot planar_gripper(const GripperStart& start) {
-  return {.model = builtin("planar_gripper"), .q = {start.x, start.y, start.rotation, start.opening / 2, start.opening / 2}};
+  return {.model = builtin("planar_gripper"),
+          .q = {start.x, start.y, start.rotation, start.opening / 2, start.opening / 2}};
 }
 
 SceneRobot pusher(const PusherStart& start) {

@@ -33,7 +33,7 @@ struct SceneObject {
   double x = 0.0, y = 0.0;       ///< p_WoBo_W in the surface's plane, m
   double yaw = 0.0;              ///< rad about z
 
-  /// m; how far the centre is above the surface at rest.
+  /// Returns how far the centre is above the surface at rest, m.
   double rest_height() const;
 };
 
@@ -108,12 +108,12 @@ struct Scene {
   SceneTask task;
   ScenePhysics physics;
 
-  /// Index of the target in objects, or -1.
+  /// Returns the index of the target in objects, or -1.
   int target() const;
 };
 
 /// Reads and checks a scene of format 2, or 1 (scenes/README.md has both).
-/// `robots`: where a robot that it names is looked for; a scene that is made of text alone finds built-in models only.
+/// `robots`: where a robot that the text names is looked for; by default only built-in models are found.
 /// Errors   kIo, kNotFound, kInvalidArgument; the message names file, line, field, got and wanted.
 Result<Scene> load_scene(const std::filesystem::path& file);
 Result<Scene> parse_scene(std::string_view yaml, const std::string& origin, const RobotPath& robots = {});
@@ -125,10 +125,10 @@ enum class RobotText { kWhole, kByName };
 /// the robot whole, so that whoever has the text needs no other file.
 std::string to_yaml(const Scene& scene, RobotText robot = RobotText::kWhole);
 
-/// Hash of the canonical text; the name of the world compiled from it.
+/// Returns the hash of the canonical text: the name of the world compiled from it.
 Hash scene_hash(const Scene& scene);
 
-/// Sizes and masses in range, names unique, target and robot known, nothing
+/// Checks that sizes and masses are in range, names unique, target and robot known, nothing
 /// inside anything else, everything on the surface.
 Result<void> validate(const Scene& scene, const std::string& origin);
 
@@ -137,21 +137,21 @@ Result<void> validate(const Scene& scene, const std::string& origin);
 using Locate = std::function<std::string(std::string_view field)>;
 Result<void> validate(const Scene& scene, const Locate& locate);
 
-/// Signed distance between the footprints of an object and a disc, m; negative
-/// inside. Of boxes that overlap, how far they would have to part.
+/// Returns the distance between the footprints of an object and a disc, m. Where they overlap it is
+/// negative: how far they would have to part.
 double signed_distance(const SceneObject& object, const Disc& disc);
 
 /// Whether the footprints of two objects come closer than `gap` metres.
 bool overlap(const SceneObject& a, const SceneObject& b, double gap = 0.0);
 
-/// Whether an object is inside the robot's start pose as seen from above, or closer than `gap` metres. Only of robots
-/// that move in the plane: of arms the engine knows more (World::compile).
+/// Whether an object is inside the robot's start pose as seen from above, or closer than `gap` metres. Never so for
+/// robots other than those that move in the plane: the engine checks arms (World::compile).
 bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap = 0.0);
 
 /// Whether an object would find its place free: nothing of the scene is nearer than `gap` metres.
 bool is_free(const Scene& scene, const SceneObject& object, double gap);
 
-/// Parts of a State for this scene, and the state at its start: at rest.
+/// These return the layout of this scene's states, and the state at its start, at rest.
 StateLayout layout_of(const Scene& scene);
 State initial_state(const Scene& scene);
 

@@ -118,12 +118,14 @@ Scene read(const YAML::Node& root, const std::string& origin, const RobotPath& r
   Fields fields(root, "", origin);
   int version = 0;
   fields.required("jostle_scene", version);
-  if (version != 1 && version != 2) fields.refuse("jostle_scene", fmt::format("got version {}, wanted 2 or 1", version));
+  if (version != 1 && version != 2)
+    fields.refuse("jostle_scene", fmt::format("got version {}, wanted 2 or 1", version));
   fields.optional("name", scene.name);
   fields.section("surface", false, [&](Fields& surface) {
     version == 1 ? read_surface_1(surface, scene) : read_surface(surface, scene);
   });
-  if (version == 2) fields.optional_list("fixtures", [&](Fields& entry) { scene.fixtures.push_back(read_fixture(entry)); });
+  if (version == 2)
+    fields.optional_list("fixtures", [&](Fields& entry) { scene.fixtures.push_back(read_fixture(entry)); });
   fields.section("robot", false, [&](Fields& robot) {
     version == 1 ? read_robot_1(robot, scene) : read_robot_2(robot, scene, robots);
   });
@@ -202,7 +204,8 @@ std::string to_yaml(const Scene& scene, RobotText robot_text_as) {
     text += '\n';
   };
   const auto pose = [](const Pose& X) {
-    return fmt::format("{{position: [{}], orientation: [{}]}}", fmt::join(X.position, ", "), fmt::join(X.orientation, ", "));
+    return fmt::format("{{position: [{}], orientation: [{}]}}", fmt::join(X.position, ", "),
+                       fmt::join(X.orientation, ", "));
   };
   line("jostle_scene: 2");
   line("name: {}", quoted(scene.name));

@@ -9,7 +9,7 @@
 
 namespace jostle::physics_pool {
 
-/// Sides along x and y.
+/// A rectangle with sides along x and y.
 struct Rectangle {
   double x = 0.0, y = 0.0;               ///< centre, m
   std::array<double, 2> size{0.6, 0.6};  ///< full extents x, y, m

@@ -21,26 +21,26 @@ struct TaskKind {
   const char* achieved;  ///< what has come about at its end, "target grasped"
   bool has_goal;         ///< scenes give it a goal region, and may give an obstacle
 
-  /// What a scene lacks for it: empty, or "got …, wanted …".
+  /// Says what a scene lacks for it, "got …, wanted …"; empty if nothing.
   std::string (*misfit)(const Scene& scene);
 
-  /// c_g of the objective; `angle_weight` is its w_phi, m^2/rad^2.
+  /// Returns c_g, the measure of the objective's term `goal`; `angle_weight` is that term's w_phi, m^2/rad^2.
   double (*cost)(const TaskGeometry& geometry, const State& x, double angle_weight);
 
   /// How far the task is from its end, m.
   double (*distance)(const TaskGeometry& geometry, const State& x);
 
-  /// Whether the target is where it is to be. Whether it stands there is asked by `at_goal`.
+  /// Whether the target is where it is to be. It need not stand there: that is for `at_goal` to check.
   bool (*reached)(const TaskGeometry& geometry, const State& x);
 
   /// Why the task has failed at x, in a phrase; empty if it has not.
   std::string (*failure)(const TaskGeometry& geometry, const State& x);
 };
 
-/// All of them, in the order in which messages list them.
+/// Returns all kinds of tasks, in the order in which messages list them.
 std::span<const TaskKind* const> task_kinds();
 
-/// Null if there is none of that name.
+/// Finds a kind of task by its name; null if there is none.
 const TaskKind* find_task_kind(std::string_view name);
 
 }  // namespace jostle::physics_pool

@@ -20,8 +20,8 @@ struct TaskGeometry {
   std::vector<double> rest_heights;  ///< [objects] m
   SceneTask task;
   const TaskKind* kind;  ///< what task.kind means
-  SceneObject target;    ///< its shape, without a name; where it is says the state
-  RobotModel robot;      ///< without its geoms: they cost copies and nobody here asks for them
+  SceneObject target;    ///< the target's shape, without its name; the state says where it is
+  RobotModel robot;      ///< without its geoms, which cost copies and which nobody here asks for
   Eigen::Isometry3d base;
   std::optional<PlanarRobot> planar;  ///< how the robot moves in the plane, if it does
   double disc_radius = 0.0;           ///< m, of a robot that is a disc; 0 for others
@@ -29,7 +29,7 @@ struct TaskGeometry {
   StateView view(const State& x) const { return {layout, x}; }
 };
 
-/// X_WT of the hand's frame G, or of the robot's last link where it has no hand.
+/// Returns X_WT of the hand's frame G, or of the robot's last link where it has no hand.
 Eigen::Isometry3d tool_pose(const TaskGeometry& geometry, const State& x);
 
 /// A point in the tool's frame, m.
@@ -50,26 +50,26 @@ TargetBearing target_bearing(const TaskGeometry& geometry, const State& x);
 /// Whether the target's centre is in the pre-grasp region of the hand, which there must be.
 bool in_pre_grasp_region(const TaskGeometry& geometry, const State& x);
 
-/// Other objects whose centre lies between the fingers, palm to fingertips; 0 without a hand.
+/// Counts other objects whose centre lies between the fingers, palm to fingertips; 0 without a hand.
 int count_obstructions(const TaskGeometry& geometry, const State& x);
 
-/// Indices of the other objects whose centre is in the goal region; none where the task has no region.
+/// Returns indices of the other objects whose centre is in the goal region; none where the task has no region.
 std::vector<int> intruders(const TaskGeometry& geometry, const State& x);
 int count_intruders(const TaskGeometry& geometry, const State& x);
 
 /// Whether the target's, or a disc-shaped robot's, footprint is over the obstacle.
 bool target_hits_obstacle(const TaskGeometry& geometry, const State& x);
 bool pusher_hits_obstacle(const TaskGeometry& geometry, const State& x);
-int count_collisions(const TaskGeometry& geometry, const State& x);  ///< of the two, how many
+int count_collisions(const TaskGeometry& geometry, const State& x);  ///< how many of the two are
 
-/// Indices of objects whose centre is more than `height` m below its resting place.
+/// Returns indices of objects whose centre is more than `height` m below its resting place.
 std::vector<int> dropped_objects(const TaskGeometry& geometry, const State& x, double height);
 int count_dropped(const TaskGeometry& geometry, const State& x, double height);
 
 /// How many objects' axes lean more than `angle` rad from upright.
 int toppled_objects(const TaskGeometry& geometry, const State& x, double angle);
 
-/// Names of objects by index, "a, b".
+/// Writes names of objects by index, "a, b".
 std::string names_of(const StateLayout& layout, const std::vector<int>& objects);
 
 }  // namespace jostle::physics_pool

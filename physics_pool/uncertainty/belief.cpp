@@ -92,8 +92,9 @@ Result<void> check_belief(const Scene& execution, const Scene& belief) {
     return result;
   };
   if (names(belief) == names(execution)) return {};
-  return invalid("objects", fmt::format("{}", fmt::join(names(belief), ", ")),
-                 fmt::format("those of scene '{}' in its order: {}", execution.name, fmt::join(names(execution), ", ")));
+  return invalid(
+      "objects", fmt::format("{}", fmt::join(names(belief), ", ")),
+      fmt::format("those of scene '{}' in its order: {}", execution.name, fmt::join(names(execution), ", ")));
 }
 
 }  // namespace jostle::physics_pool

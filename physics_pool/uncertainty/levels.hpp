@@ -14,7 +14,7 @@ enum class Uncertainty { kNone, kLow, kMedium, kHigh };
 Result<Uncertainty> parse_uncertainty(std::string_view word);
 const char* to_string(Uncertainty level);
 
-/// Standard deviation of the velocity noise of Eq. 3.3, per engine step and
+/// Returns the standard deviation of the velocity noise of Eq. 3.3, per engine step and
 /// degree of freedom, m/s and rad/s: 0, 0.003, 0.006, 0.009.
 double velocity_noise(Uncertainty level);
 

@@ -20,13 +20,13 @@ struct Problem {
   Hash world;  ///< planning world, known to the pool
   State x0;
   ControlSequence initial;       ///< candidate to improve, at least one step
-  std::vector<double> u_before;  ///< [nu] control before its first step; empty: at rest
+  std::vector<double> u_before;  ///< [nu] control before the candidate's first step; empty: at rest
   int iterations = 50;           ///< I_max
   /// No iteration begins once so many rollouts are spent; the last one may go beyond it.
   std::uint64_t rollouts = UINT64_MAX;
   std::uint64_t seed = 0;
-  std::uint32_t stream = 0;                                           ///< first noise stream; one is used per iteration
-  bool clear_hand = false;                                            ///< let Objective::obstruction count
+  std::uint32_t stream = 0;  ///< first noise stream; one is used per iteration
+  physics_pool::Objective objective = physics_pool::Objective::standard();
   physics_pool::Priority priority = physics_pool::Priority::kNormal;  ///< of its rollouts; changes no plan
 };
 
@@ -35,8 +35,8 @@ struct Plan {
   ControlSequence controls;  ///< u_0 … u_{n-1}
   Trajectory states;         ///< x_0 … x_n, predicted
   double cost = physics_pool::kInfinity;
-  /// The task's goal is predicted reached at x_n, at a cost that says nothing
-  /// failed on the way (success_cost).
+  /// Whether the task's goal is predicted to be reached at x_n, at a cost so low (success_cost) that nothing
+  /// failed on the way.
   bool at_goal = false;
   int iterations = 0;
   std::uint64_t rollouts = 0;
@@ -53,6 +53,8 @@ struct Progress {
 };
 using OnProgress = std::function<void(const Progress&)>;
 
+/// A Planner improves a candidate sequence of controls.
+///
 /// Repeats  equal problems give bit-equal plans on any pool.
 /// Errors   those of Pool::run
 ///          kInvalidArgument  every rollout from x0 diverged; says why

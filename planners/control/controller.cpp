@@ -116,7 +116,10 @@ class Run {
   }
 
   Result<void> plan(const ControlSequence& initial, int iterations) {
-    return execution_.plan(initial, iterations, must_clear_hand());
+    // What has lodged in the hand counts only once predictions have failed that counted on grasping past it.
+    physics_pool::Objective objective = setup_.objective;
+    if (!must_clear_hand()) objective["obstruction"].weight = 0.0;
+    return execution_.plan(initial, iterations, objective);
   }
 
   Result<void> act() {

@@ -25,17 +25,17 @@ struct ControlOptions {
   /// stuck. Equal to few_iterations it is Alg. 2 to the letter.
   int few_iterations_max = 8;
   /// After so many re-plans in a row, plans must also clear the hand of what has
-  /// lodged in it: predictions that counted on grasping past it have failed.
+  /// lodged in it, because predictions that counted on grasping past it have failed.
   int obstruction_patience = 3;
   int min_steps = 2;  ///< n_min
   /// SD_thresh: largest |x_predicted - x_observed|, over robot joints (m, rad)
   /// and objects (m, and rad of rotation).
   double deviation_threshold = 0.5;
-  int initial_steps = 6;                              ///< n of the straight line
-  double straight_speed = 0.04;                       ///< m/s of the single straight step
-  double step_duration = 1.0;                         ///< Delta_t, s
-  bool plan_only = false;                             ///< stop after the first plan
-  bool close_hand = true;                             ///< close the fingers on the target at the end
+  int initial_steps = 6;         ///< n of the straight line
+  double straight_speed = 0.04;  ///< m/s of the single straight step
+  double step_duration = 1.0;    ///< Delta_t, s
+  bool plan_only = false;        ///< stop after the first plan
+  bool close_hand = true;        ///< close the fingers on the target at the end
 };
 
 /// Runs one task to its end. A task that fails (dropped object, timeout) is an
@@ -45,12 +45,12 @@ struct ControlOptions {
 Result<Outcome> run_controller(const ControlSetup& setup, const ControlOptions& options, const OnEvent& on_event = {},
                                std::stop_token stop = {});
 
-/// U of `steps` equal controls that would bring the hand straight to its
+/// Returns `steps` equal controls that would bring the hand straight to its
 /// pre-grasp distance from the target if nothing were in the way.
 ControlSequence straight_line(const physics_pool::TaskGeometry& geometry, const State& x, int steps,
                               double step_duration);
 
-/// |a - b| over robot joints and object poses, in m and rad.
+/// Returns |a - b| over robot joints and object poses, in m and rad.
 double state_deviation(const StateLayout& layout, const State& a, const State& b);
 
 }  // namespace jostle::planners

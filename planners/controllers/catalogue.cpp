@@ -77,10 +77,12 @@ Result<const ControllerKind*> find_controller(std::string_view name, const Scene
     if (name.empty() || kind->name == name) return kind;
     fitting.push_back(kind->name);
   }
-  const std::string wanted = fitting.empty() ? fmt::format("another task or robot: no controller can do it with the robot '{}'",
-                                                           scene.robot.model.name)
-                                             : fmt::format("{}", fmt::join(fitting, ", "));
-  return invalid("controller", name.empty() ? "none" : fmt::format("'{}' for a task to {}", name, scene.task.kind), wanted);
+  const std::string wanted =
+      fitting.empty()
+          ? fmt::format("another task or robot: no controller can do it with the robot '{}'", scene.robot.model.name)
+          : fmt::format("{}", fmt::join(fitting, ", "));
+  return invalid("controller", name.empty() ? "none" : fmt::format("'{}' for a task to {}", name, scene.task.kind),
+                 wanted);
 }
 
 }  // namespace jostle::planners

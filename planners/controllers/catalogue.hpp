@@ -11,7 +11,7 @@
 
 namespace jostle::planners {
 
-/// What controllers are told; each takes its part.
+/// The options of all controllers; each controller takes its part.
 struct ControllerOptions {
   ControlOptions control;
   MpcOptions mpc;
@@ -23,7 +23,7 @@ struct ControllerOptions {
 struct ControllerKind {
   const char* name;        ///< as users type it
   const char* purpose;     ///< one phrase with its source
-  const char* parameters;  ///< file of what `jostle run` gives it where the user names none
+  const char* parameters;  ///< the parameter file that `jostle run` gives it where the user names none
 
   /// Whether it can do a scene's task with the scene's robot.
   bool (*fits)(const physics_pool::Scene& scene);
@@ -33,17 +33,17 @@ struct ControllerKind {
                          std::stop_token stop);
 };
 
-/// All of them. The first that fits a scene is what the scene gets where nobody names one.
+/// Returns all controllers. Where nobody names one, a scene gets the first that fits it.
 std::span<const ControllerKind* const> controllers();
 
 /// Names and purposes on one line, for help texts.
 std::string controller_help();
 
-/// By name, or the first that fits the scene where the name is empty.
+/// Finds a controller by its name, or the first that fits the scene where the name is empty.
 /// Error kInvalidArgument: "controller: got 'mpc' for a task to grasp, wanted or, nr".
 Result<const ControllerKind*> find_controller(std::string_view name, const physics_pool::Scene& scene);
 
-/// Adds one at the end, for programs that bring controllers of their own: before anything runs, from one thread.
+/// Adds a controller at the end, for programs that bring their own. Call it from one thread, before anything runs.
 /// `kind` outlives its users.
 void add_controller(const ControllerKind& kind);
 

@@ -32,8 +32,7 @@ void Outcome::conclude(Ending how, std::string why) {
   reason = std::move(why);
 }
 
-Execution::Execution(const ControlSetup& setup, double step_duration, const OnEvent& on_event,
-                     std::stop_token stop)
+Execution::Execution(const ControlSetup& setup, double step_duration, const OnEvent& on_event, std::stop_token stop)
     : setup_(setup),
       step_duration_(step_duration),
       on_event_(on_event),
@@ -58,7 +57,7 @@ Result<void> Execution::observe() {
   return {};
 }
 
-Result<void> Execution::plan(const ControlSequence& initial, int iterations, bool clear_hand,
+Result<void> Execution::plan(const ControlSequence& initial, int iterations, const physics_pool::Objective& objective,
                              std::vector<double> u_before) {
   notify(Phase::kPlanning);
   const auto before = Clock::now();
@@ -73,7 +72,7 @@ Result<void> Execution::plan(const ControlSequence& initial, int iterations, boo
                   .rollouts = rollouts_left(),
                   .seed = setup_.seed,
                   .stream = stream_,
-                  .clear_hand = clear_hand,
+                  .objective = objective,
                   // From the first action on a robot stands still for as long as this takes.
                   .priority = outcome_.actions > 0 ? physics_pool::Priority::kUrgent : physics_pool::Priority::kNormal};
   auto plan_result = setup_.planner.plan(problem, deadline_, stop_);

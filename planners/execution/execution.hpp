@@ -22,8 +22,8 @@ namespace jostle::planners {
 /// How long a run may go on, planning and acting together.
 struct RunLimits {
   std::chrono::milliseconds timeout{15 * 60 * 1000};
-  /// Rollouts of all its plans; 0: as many as there is time for. A run that is limited by rollouts, rather than by time,
-  /// makes the same decisions however fast its machines are and whoever else uses them.
+  /// Rollouts of all plans of a run; 0: as many as there is time for. A run that is limited by rollouts, rather than by
+  /// time, makes the same decisions however fast its machines are and whoever else uses them.
   std::uint64_t rollouts = 0;
 };
 
@@ -36,7 +36,7 @@ struct ControlSetup {
   physics_pool::Objective objective;
   Hash world;
   std::uint64_t seed = 0;
-  /// Makes an observed state one that physics can start from; may be empty.
+  /// Turns an observed state into one that physics can start from; may be empty.
   std::function<Result<State>(const State&)> make_feasible;
   RunLimits limits;
 };
@@ -54,19 +54,19 @@ struct ControlEvent {
 };
 using OnEvent = std::function<void(const ControlEvent&)>;
 
-/// How a run ended; the numbers are those of jostle_msgs/msg/GoalResult. A controller says the first
-/// four, whoever started it the others.
+/// How a run ended; the numbers are those of jostle_msgs/msg/GoalResult. A controller gives the first
+/// four, and whoever started the controller gives the others.
 enum class Ending : std::uint8_t {
   kUnknown = 0,  ///< not over yet, or nobody has said
   kSucceeded = 1,
-  kFailed = 2,  ///< it came to an end, and not to the wanted one
+  kFailed = 2,  ///< it came to an end that was not the wanted one
   kTimedOut = 3,
   kCancelled = 4,
   kBroken = 5,  ///< parts of the system failed
   kRefused = 6  ///< never begun
 };
 
-/// "succeeded", "timed out".
+/// Returns words such as "succeeded" or "timed out".
 const char* to_string(Ending ending);
 
 struct Outcome {
@@ -78,27 +78,28 @@ struct Outcome {
   int actions = 0;
   std::uint64_t rollouts = 0;                     ///< over all plans
   int iterations = 0;                             ///< over all plans
-  std::chrono::duration<double> plan_time{};      ///< of the first plan
-  std::chrono::duration<double> planning_time{};  ///< of all plans
+  std::chrono::duration<double> plan_time{};      ///< time that the first plan took
+  std::chrono::duration<double> planning_time{};  ///< time that all plans took
   std::chrono::duration<double> total_time{};
   Trajectory observed;  ///< before the first action and after each
   std::vector<std::string> dropped;
 
-  /// Says how it ended, and why for people.
+  /// Notes how the run ended, and why, in words for people.
   void conclude(Ending how, std::string why);
   bool is_over() const { return ending != Ending::kUnknown; }
 };
 
 /// One run of a controller under way: the newest state, the present plan, and what
-/// has come of it so far.
+/// has come of the run so far.
 ///
 /// Threads  one.
-/// Time     kDeadline once the run has taken longer than its time, or needs a plan and has no rollouts left.
+/// Errors   kDeadline  the run has taken longer than its time, or needs a plan and has no rollouts left
 class Execution {
  public:
   Execution(const ControlSetup& setup, double step_duration, const OnEvent& on_event, std::stop_token stop);
 
   const StateLayout& layout() const { return setup_.geometry.layout; }
+  const physics_pool::Objective& objective() const { return setup_.objective; }
   const State& x() const { return x_; }                                 ///< newest observation
   const robot_bridge::RobotReading& robot() const { return reading_; }  ///< of the same moment
   Outcome& outcome() { return outcome_; }
@@ -113,17 +114,17 @@ class Execution {
 
   Result<void> observe();
 
-  /// Plans from x(), with fresh noise.
-  Result<void> plan(const ControlSequence& initial, int iterations, bool clear_hand = false,
+  /// Plans from x(), with fresh noise. `objective`: the setup's, or what a controller makes of it for this plan.
+  Result<void> plan(const ControlSequence& initial, int iterations, const physics_pool::Objective& objective,
                     std::vector<double> u_before = {});
 
   /// Executes u_0, removes it and x_0 from the plan, observes.
   Result<void> act();
 
-  /// Applies u, which is of no plan, and observes.
+  /// Applies u, which belongs to no plan, and observes.
   Result<void> move(std::span<const double> u, Phase phase);
 
-  /// Ends the run. A task that ran out of time has failed, the system has not.
+  /// Ends the run. A task that ran out of time is an Outcome, because the system has not failed.
   Result<Outcome> end(const Result<void>& ended);
 
   void notify(Phase phase) const;
@@ -147,7 +148,7 @@ class Execution {
   Outcome outcome_;
 };
 
-/// A State from the two ports' readings.
+/// Makes a State from the two ports' readings.
 /// Error kInvalidArgument if an object of the layout is missing; names it.
 Result<State> assemble_state(const StateLayout& layout, const robot_bridge::RobotReading& robot,
                              const std::vector<perception::ObjectReading>& objects);

@@ -30,7 +30,10 @@ class Run {
   Run(const ControlSetup& setup, const MpcOptions& options, const OnEvent& on_event, std::stop_token stop)
       : setup_(setup),
         options_(options),
-        execution_(setup, options.step_duration, on_event, std::move(stop)) {}
+        execution_(setup, options.step_duration, on_event, std::move(stop)),
+        objective_(setup.objective) {
+    objective_["obstruction"].weight = 0.0;  // a push grasps nothing
+  }
 
   Result<Outcome> go() { return execution_.end(push()); }
 
@@ -41,7 +44,7 @@ class Run {
       const bool first = !execution_.has_planned();
       if (!first) ++execution_.outcome().replans;
       const int iterations = first ? options_.first_iterations : options_.iterations;
-      if (auto ok = execution_.plan(initial, iterations, false, u_before_); !ok) return ok;
+      if (auto ok = execution_.plan(initial, iterations, objective_, u_before_); !ok) return ok;
       if (options_.plan_only) return conclude_plan();
       const auto u = execution_.plan().controls.step(0);
       u_before_.assign(u.begin(), u.end());
@@ -102,7 +105,8 @@ class Run {
   const ControlSetup& setup_;
   const MpcOptions& options_;
   Execution execution_;
-  std::vector<double> u_before_;  // [nu] the newest executed control; empty before the first
+  physics_pool::Objective objective_;  // of its plans
+  std::vector<double> u_before_;       // [nu] the newest executed control; empty before the first
 };
 
 }  // namespace
@@ -148,17 +152,6 @@ ControlSequence straight_push(const physics_pool::TaskGeometry& geometry, const 
     controls.append(u);
   }
   return controls;
-}
-
-PbstoOptions push_planner_options() {
-  PbstoOptions options;
-  options.rollouts = 20;
-  options.sigma = {0.01, 0.01};
-  options.limit = {0.1, 0.1};
-  options.scales = {1.0, 2.0, 4.0, 0.5};
-  options.min_steps = 0;
-  options.objective.success_cost = 10000.0;
-  return options;
 }
 
 }  // namespace jostle::planners

@@ -8,18 +8,17 @@
 #include "idl/types/result.hpp"
 #include "idl/types/state.hpp"
 #include "planners/execution/execution.hpp"
-#include "planners/pbsto/pbsto.hpp"
 
 namespace jostle::planners {
 
 struct MpcOptions {
-  int horizon = 4;                                    ///< N, actions of a plan (Sec. 6.3.3)
-  int first_iterations = 4;                           ///< of the optimizer, for the first plan
-  int iterations = 2;                                 ///< for every other; more find more and cost more
-  int max_actions = 20;                               ///< the task has failed after so many (Sec. 6.3.3)
-  double straight_speed = 0.1;                        ///< m/s, of the straight push, at most
-  double step_duration = 1.0;                         ///< Delta_t, s
-  bool plan_only = false;                             ///< stop after the first plan
+  int horizon = 4;              ///< N, actions of a plan (Sec. 6.3.3)
+  int first_iterations = 4;     ///< of the optimizer for the first plan
+  int iterations = 2;           ///< for every other; more find more and cost more
+  int max_actions = 20;         ///< the task has failed after so many (Sec. 6.3.3)
+  double straight_speed = 0.1;  ///< m/s, of the straight push, at most
+  double step_duration = 1.0;   ///< Delta_t, s
+  bool plan_only = false;       ///< stop after the first plan
 };
 
 /// Runs one push task to its end. A task that fails (obstacle hit, object dropped,
@@ -30,15 +29,10 @@ struct MpcOptions {
 Result<Outcome> run_mpc(const ControlSetup& setup, const MpcOptions& options, const OnEvent& on_event = {},
                         std::stop_token stop = {});
 
-/// U of `steps` controls that push the target straight towards the centre of its goal
-/// region, no further than there, if nothing is in the way. A pusher that is not
-/// behind the target first goes there, round it, at `speed` m/s at most.
+/// Returns `steps` controls that push the target straight to the centre of its goal
+/// region, and no further, if nothing is in the way. A pusher that is not
+/// behind the target first goes round it to get there, at `speed` m/s at most.
 ControlSequence straight_push(const physics_pool::TaskGeometry& geometry, const State& x, int steps,
                               double step_duration, double speed);
-
-/// What PBSTO pushes with: 20 samples around 4 actions, with the exploration variance
-/// of 1e-4 of Sec. 6.3.3. The other numbers were chosen on random scenes that no
-/// experiment uses; `experiments/pushing.yaml` has the same and says why.
-PbstoOptions push_planner_options();
 
 }  // namespace jostle::planners

@@ -85,7 +85,6 @@ Result<Plan> Pbsto::plan(const Problem& problem, TimePoint deadline, std::stop_t
                                      .limit = options_.limit,
                                      .scales = options_.scales,
                                      .persistence = options_.persistence},
-                             .objective = options_.objective,
                              .stop_losers = options_.stop_losers,
                              .stop_hopeless = options_.stop_hopeless,
                              .min_steps = options_.min_steps,

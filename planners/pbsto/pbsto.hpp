@@ -21,20 +21,19 @@ struct PbstoOptions {
   /// Factors of sigma dealt out to the K samples in turn. Small ones first: of
   /// several samples that succeed the one with the lowest index is taken.
   std::vector<double> scales{0.125, 0.25, 0.5, 1.0};
-  double persistence = 0.0;  ///< of the noise from step to step, in [0, 1) (SamplingLaw)
+  double persistence = 0.0;  ///< how much of the noise the next step keeps, in [0, 1) (SamplingLaw)
   Update update = Update::kGreedy;
   double lambda = 100.0;       ///< of Eq. 5.8, in units of cost; small is greedy
   int min_steps = 2;           ///< n_min of Alg. 1
   double step_duration = 1.0;  ///< Delta_t, s
   bool stop_losers = true;     ///< never changes the plan, only its price
-  bool stop_hopeless = false;  ///< sooner still, on the assumption of objective/bound.hpp
+  bool stop_hopeless = false;  ///< stop losers sooner still, on the assumption of objective/bound.hpp
   bool freeze = false;         ///< objects at rest have no freedom until touched (Fidelity)
-  /// Candidates screened for each of the K rollouts: K·screening are drawn and run
+  /// How many candidates are screened for each of the K rollouts: K·screening are drawn and run
   /// with long steps, the K cheapest again with the fine model, and the choice is
   /// made among those. 1 screens nothing.
   int screening = 1;
   double screening_time_step = 0.005;  ///< s; longer is cheaper and ranks worse
-  physics_pool::Objective objective = physics_pool::Objective::standard();
 };
 
 class Pbsto final : public Planner {

@@ -105,7 +105,6 @@ SamplingPlanner::SamplingPlanner(physics_pool::Pool& pool, SamplingOptions optio
 Result<Plan> SamplingPlanner::plan(const Problem& problem, TimePoint deadline, std::stop_token stop) {
   const RolloutBatch pattern{.step_duration = options_.step_duration,
                              .law = {.sigma = options_.sigma, .limit = options_.limit},
-                             .objective = options_.objective,
                              .stop_losers = options_.stop_losers,
                              .min_steps = options_.min_steps,
                              .fidelity = options_.fidelity};

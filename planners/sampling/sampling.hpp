@@ -27,34 +27,33 @@ struct SamplingOptions {
   Method method = Method::kPredictive;
   int rollouts = 8;  ///< K per iteration, >= 1; more find more and cost more
   /// [nu] standard deviations of the noise on x, y [m/s], rotation [rad/s] and
-  /// opening [m/s]; of kCem and kIcem in the first iteration.
+  /// opening [m/s]; for kCem and kIcem, those of the first iteration.
   std::vector<double> sigma{0.04, 0.04, 0.25, 0.004};
   std::vector<double> limit{0.15, 0.15, 0.8, 0.05};  ///< [nu] largest controls, same units
-  double lambda = 100.0;                             ///< of kMppi, in units of cost, > 0; small is greedy
-  /// Of kCem and kIcem: part of K that the fit is made to, in (0, 1], rounded up;
+  double lambda = 100.0;                             ///< kMppi: lambda as above, units of cost, > 0; small is greedy
+  /// kCem and kIcem: the part of K that a fit is made to, in (0, 1], rounded up;
   /// a larger one converges later, and less often to the wrong place.
   double elites = 0.25;
-  /// Of kCem and kIcem, in [0, 1): part of the old candidate and the old sigma
-  /// that a fit leaves; more is steadier and slower.
+  /// kCem and kIcem: the part of the old candidate and the old sigma that a fit
+  /// leaves, in [0, 1); more is steadier and slower.
   double smoothing = 0.1;
-  /// Of kCem and kIcem, in [0, 1]: least sigma, as part of the first one; above 0
+  /// kCem and kIcem: the least sigma, as a part of the first one, in [0, 1]; above 0
   /// the search never freezes.
   double sigma_floor = 0.1;
-  double persistence = 0.7;  ///< of kIcem, in [0, 1): SamplingLaw::persistence; the others' noise is white
-  /// Of kIcem, in [0, 1]: part of the elites that compete again in the next
-  /// iteration, rounded up. Physics repeats itself, so they cost no rollout.
+  double persistence = 0.7;  ///< kIcem: SamplingLaw::persistence, in [0, 1); the others' noise is white
+  /// kIcem: the part of the elites that compete again in the next iteration, in
+  /// [0, 1], rounded up. Physics repeats itself, so they cost no rollout.
   double kept = 0.3;
-  /// Of kIcem, in (0, 1]: iteration i draws K·decay^i samples, and no fewer than
+  /// kIcem: iteration i draws K·decay^i samples, decay in (0, 1], and no fewer than
   /// twice the elites.
   double decay = 0.8;
   int min_steps = 2;           ///< n_min of Alg. 1
   double step_duration = 1.0;  ///< Delta_t, s
   bool stop_losers = true;     ///< where the update allows it; never changes the plan, only its price
   physics_pool::Fidelity fidelity;
-  physics_pool::Objective objective = physics_pool::Objective::standard();
 };
 
-/// Returns the cheapest sequence that was ever scored. After every update of
+/// A SamplingPlanner returns the cheapest sequence that was ever scored. After every update of
 /// kMppi and kCem that is no success, the candidate itself is scored, which takes
 /// one more rollout; kIcem executes its best elite and needs none.
 ///
@@ -70,7 +69,8 @@ struct SamplingOptions {
 ///                       Real-time Planning", CoRL 2020. The noise is an AR(1)
 ///                       process, not one with a power-law spectrum; it is scaled
 ///                       before and clamped after as in SamplingLaw; the mean does
-///                       not join the last iteration, which a success may make any.
+///                       not join the last iteration, because any may be the last:
+///                       a success ends the search.
 class SamplingPlanner final : public Planner {
  public:
   /// Keeps a reference to the pool, which must outlive it.

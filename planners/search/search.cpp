@@ -25,7 +25,7 @@ Search::Search(physics_pool::Pool& pool, const Problem& problem, RolloutBatch pa
   pattern_.u_before = problem.u_before;
   if (problem.u_before.empty()) pattern_.u_before.assign(static_cast<std::size_t>(problem.initial.nu), 0.0);
   pattern_.law.seed = problem.seed;
-  if (!problem.clear_hand) pattern_.objective["obstruction"].weight = 0.0;
+  pattern_.objective = problem.objective;
   pattern_.stop_on_success = true;
   pattern_.priority = problem.priority;
   best_.controls = problem.initial;
@@ -35,8 +35,7 @@ Search::Search(physics_pool::Pool& pool, const Problem& problem, RolloutBatch pa
 RolloutBatch Search::around(const ControlSequence& nominal) const {
   RolloutBatch batch = pattern_;
   batch.nominal = nominal;
-  batch.law.stream =
-      (problem_.stream + static_cast<std::uint32_t>(best_.iterations)) % physics_pool::kSamplingStreams;
+  batch.law.stream = (problem_.stream + static_cast<std::uint32_t>(best_.iterations)) % physics_pool::kSamplingStreams;
   batch.incumbent = best_.cost;
   return batch;
 }

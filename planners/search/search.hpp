@@ -13,18 +13,18 @@
 
 namespace jostle::planners {
 
-/// One call of Planner::plan. The problem must outlive it.
+/// A Search serves one call of Planner::plan. The problem must outlive it.
 class Search {
  public:
-  /// `pattern`: what all batches have in common, such as the law and the
-  /// objective. World, state and seed are the problem's, and a success ends a batch.
+  /// `pattern`: what all batches have in common, such as the law. World, state, seed and objective are the
+  /// problem's, and a success ends a batch.
   Search(physics_pool::Pool& pool, const Problem& problem, physics_pool::RolloutBatch pattern, TimePoint deadline,
          std::stop_token stop, const OnProgress& on_progress);
 
-  /// Cheapest sequence so far; its controls are the initial ones until there is one.
+  /// Returns the cheapest sequence so far; its controls are the initial ones until there is one.
   const Plan& best() const { return best_; }
 
-  /// A batch of one sample, with the noise stream of this iteration and the
+  /// Makes a batch of one sample around `nominal`, with the noise stream of this iteration and the
   /// best cost as the one to beat.
   physics_pool::RolloutBatch around(const ControlSequence& nominal) const;
 
@@ -69,10 +69,10 @@ struct Scored {
   std::vector<double> step_costs;  ///< [n]
 };
 
-/// In sample order.
+/// Returns the samples that ran to their ends, in sample order.
 std::vector<Scored> completed(const physics_pool::RolloutBatch& batch, const physics_pool::BatchReply& reply);
 
-/// exp(-(C_k - min C)/lambda). Taking the smallest cost off changes no ratio and
+/// Returns the weights exp(-(C_k - min C)/lambda). Taking the smallest cost off changes no ratio and
 /// keeps the largest weight at 1.
 std::vector<double> exponential_weights(const std::vector<double>& costs, double lambda);
 

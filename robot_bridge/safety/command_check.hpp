@@ -8,9 +8,7 @@
 
 namespace jostle::robot_bridge {
 
-/// The limit of a sender that does not know the robot's: what is faster is a mistake whatever the robot.
-inline constexpr double kAnySpeed = 10.0;       // m/s, rad/s
-/// Longer is a mistake of the sender.
+/// An action that lasts longer is a mistake of its sender.
 inline constexpr double kLongestAction = 60.0;  // s
 
 /// Checks a control [nu] against the largest velocities of the robot's axes [nu], m/s and rad/s, held for

@@ -7,7 +7,7 @@
 
 namespace jostle::bags {
 
-/// Globs as a shell's (fnmatch(3)), of ROS names; `*` goes past slashes: "/robot/*", "*pose*".
+/// Selects topics by globs of ROS names, as a shell's (fnmatch(3)); `*` goes past slashes: "/robot/*", "*pose*".
 struct Selection {
   std::vector<std::string> topics;  ///< empty: all
   std::vector<std::string> excluded;

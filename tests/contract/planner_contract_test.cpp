@@ -37,7 +37,6 @@ struct Settings {
   std::vector<double> limit{0.15, 0.15, 0.8, 0.05};
   double lambda = 1.0;
   double step_duration = 0.2;
-  physics_pool::Objective objective;
 };
 
 struct Implementation {
@@ -52,8 +51,7 @@ std::unique_ptr<Planner> pbsto(Pool& pool, const Settings& settings, OnProgress 
                              .limit = settings.limit,
                              .update = update,
                              .lambda = settings.lambda,
-                             .step_duration = settings.step_duration,
-                             .objective = settings.objective};
+                             .step_duration = settings.step_duration};
   return std::make_unique<Pbsto>(pool, options, std::move(on_progress));
 }
 
@@ -64,8 +62,7 @@ std::unique_ptr<Planner> sampling(Pool& pool, const Settings& settings, OnProgre
                                 .sigma = settings.sigma,
                                 .limit = settings.limit,
                                 .lambda = settings.lambda,
-                                .step_duration = settings.step_duration,
-                                .objective = settings.objective};
+                                .step_duration = settings.step_duration};
   return std::make_unique<SamplingPlanner>(pool, options, std::move(on_progress));
 }
 
@@ -206,12 +203,13 @@ TEST_P(PlannerContract, NoIterationsGiveTheInitialControlsAndTheirCost) {
 
 TEST_P(PlannerContract, EndsAtTheFirstSuccess) {
   bowl.can_succeed = true;
-  settings.objective.success_cost = 0.5 * initial_cost();
+  Problem problem = bowl_problem(1000);
+  problem.objective.success_cost = 0.5 * initial_cost();
 
-  const Plan plan = planned(bowl_problem(1000));
+  const Plan plan = planned(problem);
 
   EXPECT_TRUE(plan.at_goal);
-  EXPECT_LE(plan.cost, settings.objective.success_cost);
+  EXPECT_LE(plan.cost, problem.objective.success_cost);
   EXPECT_LT(plan.iterations, 1000);
   for (std::size_t i = 0; i + 1 < news.size(); ++i) EXPECT_FALSE(news[i].at_goal);
   EXPECT_TRUE(news.back().at_goal);

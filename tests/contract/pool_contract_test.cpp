@@ -12,9 +12,9 @@
 #include "physics_pool/parareal/parareal_pool.hpp"
 #include "services/pool/client/remote_pool.hpp"
 #include "tests/support/batches.hpp"
+#include "tests/support/planar.hpp"
 #include "tests/support/pushing.hpp"
 #include "tests/support/worker_process.hpp"
-#include "tests/support/planar.hpp"
 
 namespace jostle::tests {
 namespace {
@@ -32,21 +32,20 @@ struct Setting {
   void (*before_contact)(const Scene& scene, RolloutBatch& batch);  // a step meets an object
 };
 
-const Setting kGripper{
-    .scene = small_scene,
-    .before_goal =
-        [](const Scene& scene, RolloutBatch& batch) {
-          const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
-          batch.x0.q[kJointX] = target.x - 0.070;  // 10 mm short of the pre-grasp region
-          batch.x0.q[kJointY] = target.y;
-          batch.nominal.step(0)[kControlX] = 0.03;
-        },
-    .before_contact =
-        [](const Scene& scene, RolloutBatch& batch) {
-          const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
-          batch.x0.q[kJointX] = target.x - 0.105;  // a finger meets the target
-          batch.x0.q[kJointY] = target.y + 0.05;
-        }};
+const Setting kGripper{.scene = small_scene,
+                       .before_goal =
+                           [](const Scene& scene, RolloutBatch& batch) {
+                             const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
+                             batch.x0.q[kJointX] = target.x - 0.070;  // 10 mm short of the pre-grasp region
+                             batch.x0.q[kJointY] = target.y;
+                             batch.nominal.step(0)[kControlX] = 0.03;
+                           },
+                       .before_contact =
+                           [](const Scene& scene, RolloutBatch& batch) {
+                             const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
+                             batch.x0.q[kJointX] = target.x - 0.105;  // a finger meets the target
+                             batch.x0.q[kJointY] = target.y + 0.05;
+                           }};
 
 const Setting kPusher{
     .scene =

@@ -1,5 +1,5 @@
-// What a lab adds to Jostle: a robot, a term of the objective, a controller. Each is one file, and none of ours changes;
-// programs that are linked with them run them over DDS, in processes of their own.
+// What a lab adds to Jostle: a robot, a term of the objective, a controller. Each is one file, and none of ours
+// changes; programs that are linked with them run them over DDS, in processes of their own.
 
 #include <gmock/gmock.h>
 
@@ -27,8 +27,8 @@ objective: {goal: 0, acceleration: 0, disturbance: 0, edge: 0, toll: 3, toll_pri
 };
 
 TEST_F(Extensions, ATermAControllerAndARobotOfOneFileEachRunOverDds) {
-  const int code = finish({kArm, "--controller", "two-steps", "--parameters", parameters, "--workers", "2", "--json",
-                           numbers});
+  const int code =
+      finish({kArm, "--controller", "two-steps", "--parameters", parameters, "--workers", "2", "--json", numbers});
 
   ASSERT_EQ(code, 0) << run->err() << log("coordinator.log");
   const auto result = nlohmann::json::parse(std::ifstream(numbers));

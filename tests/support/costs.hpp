@@ -43,7 +43,9 @@ inline double goal_cost(const TaskGeometry& geometry, const State& x, double ang
   return geometry.kind->cost(geometry, x, angle_weight);
 }
 
-inline double goal_distance(const TaskGeometry& geometry, const State& x) { return geometry.kind->distance(geometry, x); }
+inline double goal_distance(const TaskGeometry& geometry, const State& x) {
+  return geometry.kind->distance(geometry, x);
+}
 
 inline double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1, const Objective& objective) {
   return physics_pool::edge_cost(geometry, x0, x1,

@@ -8,7 +8,7 @@
 
 namespace jostle::physics_pool {
 
-/// K answers at a time. An answer does not depend on how many are asked for with it,
+/// Works out K answers at a time. An answer does not depend on how many are asked for with it,
 /// nor on the machine: every sum runs over the inputs in their order.
 ///
 /// Threads  one at a time. Nothing is allocated after construction.

@@ -54,7 +54,7 @@ class LearnedModel final : public CoarseModel {
     return states.subspan(k * size, size);
   }
 
-  // Of all states that have such a part: the training's duration with the part's way.
+  // Advances all states that have such a part, by a step of the training's duration over the part's distance.
   void advance_part(std::span<double> states, std::span<const double> controls, double duration, int part) {
     views_.clear();
     std::size_t asked = 0;

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
-/// One push as the network sees it: the same for all states that differ by a
-/// symmetry of the fine model only.
+/// One push as the network sees it. States that differ only by a symmetry of the fine model
+/// look the same.
 
 #include <array>
 #include <span>
@@ -30,7 +30,7 @@ struct PushBodies {
   std::array<double, 2> coasting(double vx, double vy) const;
 };
 
-/// Where unused slots are, in the frame of their push: behind the pusher, out of
+/// Where the network is told that unused slots are, in the frame of the push: behind the pusher, out of
 /// its reach, each in its own place. Part of the trained network (Sec. 7.2.1.2).
 using Parking = std::array<std::array<double, 2>, kSlots>;  // m
 inline constexpr Parking kParking{{{-0.30, -0.30}, {-0.30, -0.45}, {-0.45, -0.30}, {-0.45, -0.45}}};
@@ -50,21 +50,21 @@ class PushView {
   PushView(const PushBodies& bodies, std::span<const double> state, int sliders, std::array<double, 2> u,
            double duration);
 
-  /// Sliders in slots; 0: the pusher meets none.
+  /// The number of sliders in slots; 0: the pusher meets none.
   int slots() const { return slots_; }
   int slider(int slot) const { return slider_[at(slot)]; }
 
-  /// [kInputs], SI; fold's frame and the one turned into the pusher's way.
+  /// Writes the network's inputs, [kInputs], SI, in fold's frame and in that frame turned into the pusher's way.
   void inputs(const Parking& parking, std::span<float> values) const;
 
-  /// What the network should answer, from the states before and after F: [kOutputs], per slot
-  /// change of x and y beyond the rough guess (m), of theta (rad), and the new velocity as
+  /// Writes what the network should answer, from the states before and after F: [kOutputs], per slot the
+  /// change of x and y beyond the rough guess (m), that of theta (rad), and the new velocity as
   /// a share of the pusher's speed (angular: times the slider's radius). Zero for unused slots.
   void targets(std::span<const double> before, std::span<const double> after, std::span<float> values) const;
 
-  /// Moves pusher and sliders of the `state` it was made from, as the network answers.
-  /// Whoever is out of reach of the pusher and of all that it moves, slides on as far
-  /// as its velocity takes it and rests.
+  /// Moves pusher and sliders as the network answers. `state` is the one that this view was made from.
+  /// A slider out of reach of the pusher, and of all that the pusher moves, slides on as far
+  /// as its velocity takes it, and rests.
   void apply(std::span<const float> outputs, std::span<double> state) const;
 
   /// Where the pusher's axis ends, in fold's frame, m.
@@ -90,11 +90,11 @@ class PushView {
   bool swap_ = false;  // x and y, after the signs
   double sign_x_ = 1.0, sign_y_ = 1.0;
   double handedness_ = 1.0;       // -1: the fold is a reflection
-  double cos_ = 1.0, sin_ = 0.0;  // of the way in the fold
+  double cos_ = 1.0, sin_ = 0.0;  // of the angle of the pusher's way in the fold
   double way_ = 0.0;              // m, left once a slider is touched
   // In fold's frame: of slider i until slots are filled, of slot i afterwards.
   std::array<double, kSlots> x_{}, y_{}, vx_{}, vy_{}, omega_{};
-  std::array<double, kSlots> guess_x_{}, guess_y_{};  // of slots: rough ways, m
+  std::array<double, kSlots> guess_x_{}, guess_y_{};  // rough guess of how far slots move, m
   std::array<int, kSlots> slider_{-1, -1, -1, -1};
   int slots_ = 0;
 };

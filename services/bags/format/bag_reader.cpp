@@ -201,7 +201,7 @@ class FolderReader final : public CheckedReader {
     return {};
   }
 
-  // Of equal times the earlier file's.
+  // The file whose next message is earliest; at equal times the earlier file.
   File* earliest() {
     File* first = nullptr;
     for (File& file : files_) {

@@ -25,7 +25,7 @@ struct BagInfo {
   std::filesystem::path path;  ///< as opened
   std::string storage;         ///< "mcap" or "sqlite3"
   std::vector<std::filesystem::path> files;
-  std::uint64_t bytes = 0;  ///< of the files
+  std::uint64_t bytes = 0;  ///< size of the files
   Time start = 0, end = 0;  ///< log times of the first and the last message
   std::uint64_t messages = 0;
   std::vector<TopicInfo> topics;  ///< in the order of their names
@@ -37,7 +37,7 @@ struct BagInfo {
 /// Threads  one.
 class BagReader {
  public:
-  /// A bag's folder, or one of its files.
+  /// Opens a bag by its folder, or by one of its files.
   /// Errors   kNotFound         nothing there
   ///          kInvalidArgument  no bag, of a newer version, damaged or cut off; says where
   ///                            (file and byte) and the remedy (`jostle bag recover`)
@@ -46,17 +46,17 @@ class BagReader {
 
   virtual const BagInfo& info() const = 0;
 
-  /// Index of a topic by name, or nothing.
+  /// Returns the index of a topic by name, or nothing.
   std::optional<int> find_topic(const std::string& name) const;
 
-  /// next() goes on with the first message at or after `from`, of these topics; all if empty.
+  /// Lets next() go on with the first message at or after `from`, of these topics; all if empty.
   virtual void seek(Time from, std::vector<int> topics = {}) = 0;
 
-  /// Nothing at the end. Messages of equal time come in the order they were written.
+  /// Returns the next message; nothing at the end. Messages of equal time come in the order they were written.
   /// Errors   kInvalidArgument, kIo: damaged here; says file and byte
   virtual Result<std::optional<Message>> next() = 0;
 
-  /// The newest message of a topic at or before `time`, if there is one. Does not move next().
+  /// Returns the newest message of a topic at or before `time`, if there is one. Does not move next().
   virtual Result<std::optional<Message>> last_at(int topic, Time time) = 0;
 };
 

@@ -14,7 +14,7 @@
 
 namespace jostle::bags {
 
-/// Text by name: what a bag says of itself beyond its messages.
+/// A Note is text by name: what a bag says of itself beyond its messages.
 using Note = std::map<std::string, std::string>;
 
 struct BagOptions {
@@ -42,22 +42,22 @@ class BagWriter {
   static Result<std::unique_ptr<BagWriter>> create(const std::filesystem::path& folder, const BagOptions& options);
   virtual ~BagWriter() = default;  ///< closes what was not closed
 
-  /// Its index for write(). Any time before close().
+  /// Returns the topic's index for write(). Topics may be added at any time before close().
   virtual Result<int> add_topic(const Topic& topic) = 0;
 
-  /// Messages come about in the order of their log times.
+  /// Writes a message. Messages come roughly in the order of their log times.
   virtual Result<void> write(int topic, const MessageView& message) = 0;
 
   /// Hands everything written so far to the operating system: it survives this process.
   virtual Result<void> flush() = 0;
 
-  /// Stored under `name` by the next flush() or close(), and in all files that follow.
+  /// Sets a note, which the next flush() or close() stores under `name`, as do all files that follow.
   virtual void set_note(const std::string& name, Note note) = 0;
 
-  /// Index, statistics, notes, metadata.yaml.
+  /// Writes index, statistics, notes and metadata.yaml.
   virtual Result<void> close() = 0;
 
-  virtual std::uint64_t bytes() const = 0;  ///< of all files, so far
+  virtual std::uint64_t bytes() const = 0;  ///< size of all files, so far
   virtual int files() const = 0;
 };
 

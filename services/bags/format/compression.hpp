@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What chunks are compressed with.
+/// Compression of chunks.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,7 +14,7 @@ struct ZSTD_CCtx_s;
 
 namespace jostle::bags {
 
-/// zstd at its fastest level.
+/// A Compressor runs zstd at its fastest level.
 class Compressor {
  public:
   Compressor();
@@ -22,7 +22,7 @@ class Compressor {
   Compressor(const Compressor&) = delete;
   Compressor& operator=(const Compressor&) = delete;
 
-  /// Valid until the next call; empty if zstd had no memory.
+  /// Compresses `data`. The result is valid until the next call; empty if zstd had no memory.
   std::span<const std::byte> compress(std::span<const std::byte> data);
 
  private:
@@ -30,10 +30,10 @@ class Compressor {
   std::vector<std::byte> out_;
 };
 
-/// Whether decompress knows it: "zstd", "lz4" (frames), or "" for none.
+/// Whether decompress() knows a compression: "zstd", "lz4" (frames), or "" for none.
 bool is_known_compression(const std::string& name);
 
-/// Nothing if `data` is damaged or holds other than `size` bytes. Takes memory for what comes
+/// Decompresses `data`; nothing if it is damaged, or holds other than `size` bytes. Takes memory for what comes
 /// out, not for what `size` claims.
 std::optional<std::vector<std::byte>> decompress(const std::string& name, std::span<const std::byte> data,
                                                  std::uint64_t size);

@@ -36,7 +36,7 @@ constexpr std::array<std::pair<std::string_view, Basic>, 14> kBasics{{{"bool", B
                                                                       {"float64", Basic::kF64},
                                                                       {"string", Basic::kString}}};
 
-// Of strings and messages: at least.
+// The bytes that a value takes; for strings and messages, the least.
 constexpr std::size_t size_of(Basic basic) {
   switch (basic) {
     case Basic::kU16:

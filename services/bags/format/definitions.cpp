@@ -6,11 +6,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <span>
 #include <utility>
 #include <vector>
 
 namespace jostle::embedded {
-extern const std::vector<std::pair<std::string_view, std::string_view>> kIdl;
+extern const std::span<const std::pair<std::string_view, std::string_view>> kIdl;
 }
 
 namespace jostle::bags {
@@ -179,7 +180,7 @@ class IdlParser {
     expect(";");
   }
 
-  // Of the struct that follows, in a module of their own: IDL has no constants in a struct.
+  // Parses the constants of the struct that follows, in a module of their own: IDL has no constants in a struct.
   void parse_constants() {
     expect("module");
     const Token name = take();
@@ -315,7 +316,7 @@ Result<void> collect_parts(const Structs& structs, const std::string& name, std:
 const std::map<std::string, std::string>& known() {
   // Our own files: a test makes sure that they are well-formed.
   static const std::map<std::string, std::string> kKnown = [] {
-    auto result = definitions_of_idl(embedded::kIdl);
+    auto result = definitions_of_idl({embedded::kIdl.begin(), embedded::kIdl.end()});
     return result ? std::move(*result) : std::map<std::string, std::string>();
   }();
   return kKnown;

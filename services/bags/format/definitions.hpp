@@ -14,19 +14,19 @@
 
 namespace jostle::bags {
 
-/// What ROS 2 tools want of a type ("geometry_msgs/msg/Pose"): its .msg file and, behind lines
-/// of `=`, those of the types that it is made of. Of every message of idl/msg, whose comments
-/// it keeps; nothing for other types.
+/// Returns the definition of a type ("geometry_msgs/msg/Pose") as ROS 2 tools want it: its .msg file and, behind
+/// lines of `=`, those of the types that it is made of. Every message of idl/msg has one, with the
+/// comments it has there; nothing for other types.
 std::optional<std::string> definition_of(const std::string& type);
 
-/// The same without the field that was appended since bags were first recorded: rosbag2's files of our
-/// recorder bring no definitions. Nothing if none was.
+/// Returns the definition without the field that was appended since bags were first recorded, for old bags of our
+/// recorder in rosbag2's storage, which bring no definitions. Nothing if no field was appended.
 std::optional<std::string> earlier_definition_of(const std::string& type);
 
-/// All of those types, sorted.
+/// Returns all types that have a definition, sorted.
 std::vector<std::string> known_types();
 
-/// The same from IDL: modules of modules of structs, as idl/msg has them; by type. A module
+/// Makes definitions, by type, from IDL: modules of modules of structs, as idl/msg has them. A module
 /// `Name_Constants` of `const TYPE NAME = VALUE;` holds the constants of the struct `Name`, as ROS 2
 /// writes them.
 /// Error kInvalidArgument with file name and line.
@@ -44,7 +44,7 @@ class Decoder {
   Decoder& operator=(Decoder&&) noexcept;
   ~Decoder();
 
-  /// CDR with its four bytes (XCDR1, of either byte order) as an object with fields in their
+  /// Decodes CDR with its four bytes (XCDR1, of either byte order) into an object with fields in their
   /// order. Numbers that are not finite stay what they are; dump() makes null of them.
   /// Error kInvalidArgument: other bytes than the type has; says field, got, wanted.
   Result<nlohmann::ordered_json> decode(std::span<const std::byte> cdr) const;

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// A file at whose bytes one looks here and there.
+/// InputFile: a file that is read here and there.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,7 +21,7 @@ class InputFile {
   InputFile& operator=(InputFile&&) = delete;
   ~InputFile();
 
-  /// `count` bytes from `offset` on.
+  /// Reads `count` bytes from `offset` on.
   /// Errors   kInvalidArgument  the file ends before
   ///          kIo               it cannot be read
   Result<std::vector<std::byte>> read(std::uint64_t offset, std::uint64_t count) const;
@@ -29,7 +29,7 @@ class InputFile {
   std::uint64_t size() const { return size_; }
   const std::filesystem::path& path() const { return path_; }
 
-  /// What is wrong where, as an Error. `offset`: from the file's beginning.
+  /// Makes the Error that says what is wrong where. `offset`: from the file's beginning.
   Error damaged(std::uint64_t offset, const std::string& what) const;
 
  private:

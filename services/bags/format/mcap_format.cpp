@@ -198,7 +198,7 @@ void append_footer(Bytes& out, std::uint64_t summary_start, std::uint64_t summar
     to.number(summary_offset_start);
     to.number(std::uint32_t{0});
   });
-  // Of everything from the summary on up to this number.
+  // The checksum covers everything from the summary on up to this number.
   const std::uint32_t crc = crc32_of(View(out).subspan(from, kFooterRecord - sizeof(std::uint32_t)), crc_before);
   std::memcpy(out.data() + out.size() - sizeof crc, &crc, sizeof crc);
 }

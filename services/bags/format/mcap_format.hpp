@@ -25,7 +25,7 @@ using View = std::span<const std::byte>;
 
 inline constexpr std::array<unsigned char, 8> kMagic{0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
 inline constexpr std::size_t kRecordHead = 9;    ///< opcode and length
-inline constexpr std::size_t kMessageHead = 22;  ///< of a Message's body, before its data
+inline constexpr std::size_t kMessageHead = 22;  ///< bytes of a Message's body in front of its data
 inline constexpr std::size_t kFooterRecord = kRecordHead + 20;
 
 enum class Op : std::uint8_t {
@@ -63,7 +63,7 @@ class Appender {
     bytes(std::as_bytes(std::span(value)));
   }
 
-  /// A length of type T in front of what `content` appends.
+  /// Appends a length of type T, and behind it what `content` appends.
   template <std::unsigned_integral T, class Content>
   void sized(Content&& content) {
     number(T{0});
@@ -114,9 +114,9 @@ class Parser {
     const View taken = bytes(number<std::uint32_t>());
     return {reinterpret_cast<const char*>(taken.data()), taken.size()};
   }
-  /// What a length of 32 bits in front of it spans.
+  /// Takes off a part that has its length, 32 bits, in front of it.
   Parser part() { return Parser(bytes(number<std::uint32_t>())); }
-  /// A part was malformed.
+  /// Notes that a part was malformed.
   void fail() { ok_ = false; }
 
  private:
@@ -144,15 +144,15 @@ struct MessageHead {
 /// A chunk but for its records.
 struct ChunkHead {
   std::uint64_t start = 0, end = 0;  ///< log times of its messages
-  std::uint64_t size = 0;            ///< of the records, not compressed
-  std::uint32_t crc = 0;             ///< of the same; 0: not given
+  std::uint64_t size = 0;            ///< bytes of the records, not compressed
+  std::uint32_t crc = 0;             ///< checksum of the records, not compressed; 0: not given
   std::string compression;
   std::uint64_t stored = 0;  ///< bytes of the records as they are in the file
 };
 
 struct ChunkIndex {
   std::uint64_t start = 0, end = 0;
-  std::uint64_t offset = 0, length = 0;                    ///< of the chunk's record in the file
+  std::uint64_t offset = 0, length = 0;                    ///< where the chunk's record is in the file
   std::map<std::uint16_t, std::uint64_t> message_indexes;  ///< offsets in the file, by channel
   std::uint64_t message_index_length = 0;
   std::string compression;
@@ -203,7 +203,7 @@ void append(Bytes& out, const Metadata& metadata);
 void append(Bytes& out, const MetadataIndex& index);
 void append(Bytes& out, const SummaryOffset& offset);
 void append_data_end(Bytes& out, std::uint32_t crc);
-/// `crc_before`: of the summary in front of it; 0 for an empty one.
+/// Appends a footer. `crc_before`: checksum of the summary in front of it; 0 for an empty one.
 void append_footer(Bytes& out, std::uint64_t summary_start, std::uint64_t summary_offset_start,
                    std::uint32_t crc_before);
 

@@ -17,7 +17,7 @@
 
 namespace jostle::bags::mcap {
 
-/// Of a message, what tells where it belongs.
+/// What tells where a message belongs.
 struct Place {
   std::uint16_t channel = 0;
   int topic = 0;
@@ -27,23 +27,24 @@ struct Place {
 struct Index {
   FileInfo info;
   std::map<std::uint16_t, Schema> schemas;
-  std::map<std::uint16_t, int> topics;            ///< of info.topics, by channel
-  std::map<std::uint16_t, std::uint64_t> counts;  ///< of messages, by channel
+  std::map<std::uint16_t, int> topics;            ///< index into info.topics, by channel
+  std::map<std::uint16_t, std::uint64_t> counts;  ///< messages, by channel
   std::vector<Block> blocks;                      ///< as they lie in the file
   std::optional<std::uint64_t> repeated;          ///< offset of the chunk that repeats what earlier files hold
 
-  /// A Schema or a Channel. The first of an id counts. `offset`: of the record, or of its block.
+  /// Takes in a Schema or a Channel; the first of an id counts. `offset`: where the record, or its block, is.
   Result<void> take_definition(const InputFile& file, Op op, View body, std::uint64_t offset);
   Result<void> take_metadata(const InputFile& file, const Record& record);
 
-  /// Of a message `offset` bytes behind the beginning of a block's records.
+  /// Returns the place of a message whose record is `offset` bytes behind the beginning of a block's records.
   Result<Place> place_of(const InputFile& file, const Block& block, View body, std::uint64_t offset) const;
   std::uint64_t count_of(std::uint16_t channel) const;
 };
 
+/// Makes the index of a file.
 /// Errors   kInvalidArgument  another kind of file, a later version, or damaged
 ///          kIo               it cannot be read
-/// With OpenOptions::recover only what the file's first bytes say; FileInfo::damage has the rest.
+/// With OpenOptions::recover it is an error only if the file's first bytes are wrong; FileInfo::damage has the rest.
 Result<Index> index_of(const InputFile& file, const OpenOptions& options);
 
 /// Reads the whole file for what index_of() and reading do not look at: checksums, message

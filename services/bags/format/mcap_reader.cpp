@@ -99,7 +99,7 @@ class McapReader final : public FileReader {
       while (entry != entries.begin()) {
         --entry;
         if (entry->topic != topic) continue;
-        // Of equal times the one written last; blocks come here in the order of their beginnings.
+        // At equal times the message that was written last; blocks come here in the order of their beginnings.
         if (!best || entry->log_time > best->log_time ||
             (entry->log_time == best->log_time && block.offset > best_offset)) {
           best = message_of(kept_block_, *entry);

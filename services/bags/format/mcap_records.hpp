@@ -16,8 +16,8 @@ namespace jostle::bags::mcap {
 
 struct Record {
   Op op{};
-  std::uint64_t offset = 0;  ///< of the head
-  std::uint64_t size = 0;    ///< of the body
+  std::uint64_t offset = 0;  ///< where its head is in the file
+  std::uint64_t size = 0;    ///< bytes of the body
   std::uint64_t body() const { return offset + kRecordHead; }
   std::uint64_t end() const { return body() + size; }
 };
@@ -26,7 +26,7 @@ struct Record {
 struct Block {
   bool is_chunk = true;
   std::uint64_t offset = 0, length = 0;  ///< in the file: the chunk's record, or the run
-  std::uint64_t stored = 0, size = 0;    ///< of a chunk's records
+  std::uint64_t stored = 0, size = 0;    ///< bytes of a chunk's records, in the file and decompressed
   std::string compression;
   Time start = 0, end = 0;
   /// Channels that have messages in it, if knows_channels; how many, if a scan has counted.
@@ -34,20 +34,20 @@ struct Block {
   bool knows_channels = true;
 };
 
-/// The one at `offset`, with a body that lies before `end`.
+/// Reads the record at `offset`, whose body must lie before `end`.
 Result<Record> record_at(const InputFile& file, std::uint64_t offset, std::uint64_t end);
 Result<Bytes> body_of(const InputFile& file, const Record& record);
 
-/// `offset`: of what says so.
+/// Checks a time that a file holds. `offset`: where it holds it, for the error.
 Result<Time> time_of(const InputFile& file, std::uint64_t value, std::uint64_t offset);
 
-/// A block's records, decompressed; checked against the chunk's own head and checksum.
+/// Reads a block's records, decompresses them, and checks them against the chunk's own head and checksum.
 Result<Bytes> records_of(const InputFile& file, const Block& block);
 
-/// What is wrong `offset` bytes behind the beginning of a block's records.
+/// Makes the Error that says what is wrong `offset` bytes behind the beginning of a block's records.
 Error damaged_in(const InputFile& file, const Block& block, std::uint64_t offset, const std::string& what);
 
-/// Whether a block has such records.
+/// Whether blocks have records of this kind.
 inline bool is_of_blocks(Op op) { return op == Op::kSchema || op == Op::kChannel || op == Op::kMessage; }
 
 /// Calls on_record(op, body, offset of the head) for each Schema, Channel and Message.

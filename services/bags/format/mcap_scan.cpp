@@ -187,7 +187,7 @@ class Scan {
   const InputFile& file_;
   const ScanMode mode_;
   Index& index_;
-  /// Of the last chunk, to verify its message indexes: log times and offsets by channel, sorted.
+  /// Log times and offsets of the last chunk's messages, by channel, sorted: they verify its message indexes.
   std::map<std::uint16_t, std::vector<std::pair<Time, std::uint64_t>>> last_chunk_;
 };
 

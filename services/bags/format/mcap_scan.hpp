@@ -16,8 +16,8 @@ enum class ScanMode {
   kVerify,   ///< as kRead, with a look at what reading does not need
 };
 
-/// Finds blocks, counts and notes anew; definitions come on top of those that `index` has.
-/// `end`: where the footer is, or what is left of the file ends.
+/// Finds blocks, counts and notes anew; definitions are added to those that `index` has.
+/// `end`: where the footer is, or where a file without one ends.
 Result<void> scan(const InputFile& file, std::uint64_t end, ScanMode mode, Index& index);
 
 }  // namespace jostle::bags::mcap

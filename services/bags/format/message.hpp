@@ -20,7 +20,7 @@ struct Topic {
   std::string name;        ///< "/robot/status"
   std::string type;        ///< "jostle_msgs/msg/RobotStatus"
   Qos qos;                 ///< what its writer offered
-  std::string definition;  ///< of the type, as ROS 2 messages are written down; empty if unknown
+  std::string definition;  ///< the type's, as ROS 2 messages are written down; empty if unknown
 
   bool operator==(const Topic&) const = default;
 };

@@ -28,11 +28,11 @@ struct BagMetadata {
   Notes notes;
 };
 
-/// Version 5, Humble's. Notes stand under a root key of their own: `custom_data` came with
+/// Writes version 5, Humble's. Notes stand under a root key of their own: `custom_data` came with
 /// version 6, and rosbag2 looks at its own root key only.
 std::string metadata_text(const BagMetadata& metadata);
 
-/// What a reader needs of it.
+/// What a reader needs of metadata.yaml.
 struct ReadMetadata {
   std::string storage;  ///< may be empty
   std::vector<std::filesystem::path> files;

@@ -21,7 +21,7 @@ class OutputFile {
   OutputFile& operator=(OutputFile&&) = delete;
   ~OutputFile();
 
-  /// All pieces or none, in one system call unless a signal or a full disk is in the way.
+  /// Appends all pieces or none, in one system call unless a signal or a full disk is in the way.
   /// `room`: bytes that must still fit after them, for the last piece of all.
   /// Error kIo naming the file; its size is what it was.
   Result<void> append(std::initializer_list<std::span<const std::byte>> pieces, std::uint64_t room);

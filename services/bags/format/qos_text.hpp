@@ -8,11 +8,11 @@
 
 namespace jostle::bags {
 
-/// One profile as YAML, with the numbers of rmw's enumerations as Humble writes them. What
+/// Writes one profile as YAML, with the numbers of rmw's enumerations as Humble writes them. What
 /// ROS has no word for (`retained`, `instances`) has keys of its own, which its tools skip.
 std::string qos_text(const Qos& qos);
 
-/// Of several profiles what all of them offer; names as later versions write them are known,
+/// Reads one profile or several, and returns what all of them offer. Names as later versions write them are known,
 /// too. What is missing or cannot be read is the default.
 Qos parse_qos(const std::string& text);
 

@@ -21,7 +21,7 @@ namespace jostle::bags {
 class Statement {
  public:
   void bind(int parameter, std::int64_t value) { sqlite3_bind_int64(statement_.get(), parameter, value); }
-  /// What is bound is not copied: it stays where it is until the statement is reset.
+  /// Texts and bytes are not copied: they must stay where they are until the statement is reset.
   void bind(int parameter, std::string_view text) {
     sqlite3_bind_text64(statement_.get(), parameter, text.data() == nullptr ? "" : text.data(), text.size(),
                         SQLITE_STATIC, SQLITE_UTF8);
@@ -34,7 +34,7 @@ class Statement {
 
   /// Whether there is a (further) row.
   Result<bool> step();
-  /// For what has no rows.
+  /// Runs a statement that gives no rows.
   Result<void> run();
   void reset() { sqlite3_reset(statement_.get()); }
 
@@ -56,10 +56,10 @@ class Statement {
 
 class Database {
  public:
-  /// A new one, to be written.
+  /// Creates a new database, to be written.
   static Result<Database> create(const std::filesystem::path& file);
-  /// One that is there. Rolls back what a killed writer has left half done, as every program
-  /// that opens it does. `recover`: one whose last pages are missing, too,
+  /// Opens a database that is there. Rolls back what a killed writer has left half done, as every program
+  /// that opens it does. `recover`: also opens one whose last pages are missing,
   /// unless a page is cut in two.
   static Result<Database> open(const std::filesystem::path& file, bool recover);
 

@@ -15,7 +15,7 @@ namespace jostle::bags {
 /// Notes have a table of their own, which rosbag2 does not look at: it takes every row of its
 /// table `metadata` for a bag's whole metadata.yaml, and fails on any other text.
 inline constexpr const char* kNotesTable = "jostle_notes";
-/// In it, under this name: how many of the first messages repeat earlier files.
+/// The row of that table which says how many of the first messages repeat earlier files.
 inline constexpr const char* kRepeatedRow = "jostle.repeated";
 
 Result<std::unique_ptr<FileWriter>> create_sqlite(const std::filesystem::path& file, const BagOptions& options);

@@ -19,7 +19,7 @@ namespace jostle::bags {
 
 using Notes = std::map<std::string, Note>;
 
-/// What of a file's messages is in it.
+/// Which messages have been written to a file.
 struct WrittenFile {
   std::vector<std::uint64_t> messages;  ///< by topic
   Time start = 0, end = 0;              ///< log times
@@ -38,7 +38,8 @@ class FileWriter {
   /// `notes`: those that have changed since they were last written to this file.
   virtual Result<void> flush(const Notes& notes) = 0;
 
-  /// Everything written so far repeats what earlier files hold. Before anything else.
+  /// Marks everything written so far as a repetition of what earlier files hold. Called before
+  /// anything else is written.
   virtual Result<void> end_repeated() = 0;
   virtual Result<void> close(const Notes& notes) = 0;  ///< as flush(), and what ends a file
 
@@ -48,7 +49,7 @@ class FileWriter {
 
 struct FileInfo {
   std::vector<TopicInfo> topics;
-  Time start = 0, end = 0;  ///< of its messages
+  Time start = 0, end = 0;  ///< log times of the first and the last message
   std::uint64_t messages = 0;
   Notes notes;
   /// What was found damaged; empty unless the file was opened to be recovered.
@@ -88,7 +89,7 @@ struct Storage {
 const Storage& mcap_storage();
 const Storage& sqlite_storage();
 const Storage& storage_of(BagOptions::Storage storage);
-/// By a file's ending, or nothing.
+/// Returns the storage that a file's ending says; null for other endings.
 const Storage* storage_of(const std::filesystem::path& file);
 
 }  // namespace jostle::bags

@@ -1,5 +1,7 @@
 #include "services/bags/play/control.hpp"
 
+#include "idl/types/time.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,8 +19,6 @@ constexpr std::array<std::string_view, 3> kWithValue{"seek", "rate", "loop"};
 constexpr double kJump = 5.0;  // s
 // Rates that + and - go through.
 constexpr std::array kLadder{0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0};
-
-double seconds(std::chrono::nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 Error unknown(const std::string& text) {
   return {Code::kInvalidArgument, fmt::format("control: got '{}', wanted {}", text, kCommands)};

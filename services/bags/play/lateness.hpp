@@ -15,7 +15,7 @@ class Lateness {
 
   std::uint64_t count() const { return count_; }
   std::chrono::nanoseconds worst() const { return worst_; }  ///< exact
-  /// What a fraction p in [0, 1] of the delays does not exceed, up to 2 % more; 0 without any.
+  /// Returns a delay that a fraction p in [0, 1] of the delays does not exceed, up to 2 % too long; 0 without any.
   std::chrono::nanoseconds quantile(double p) const;
 
  private:

@@ -1,5 +1,7 @@
 #include "services/bags/play/playback.hpp"
 
+#include "idl/types/time.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,8 +13,6 @@ namespace {
 constexpr std::chrono::milliseconds kShortestPass{100};
 
 constexpr TimePoint kNever = TimePoint::max();
-
-double seconds(std::chrono::nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 Time last_of(const BagInfo& info, const PlaybackOptions& options) {
   if (!options.duration) return info.end;

@@ -21,13 +21,13 @@ inline constexpr double kSlowestRate = 0.01, kFastestRate = 100.0;
 struct PlaybackOptions {
   double rate = 1.0;                                 ///< seconds of the bag per second, kSlowestRate to kFastestRate
   std::chrono::nanoseconds start{0};                 ///< where it begins, after the bag's first message; >= 0
-  std::optional<std::chrono::nanoseconds> duration;  ///< of the bag's time, > 0; else to the last message
+  std::optional<std::chrono::nanoseconds> duration;  ///< how long it plays, bag time, > 0; empty: to the last message
   bool loop = false;
   bool paused = false;
   std::vector<int> topics;          ///< indices of BagInfo::topics, at least one
-  std::vector<int> state_topics;    ///< of these, whose last message belongs to a moment
+  std::vector<int> state_topics;    ///< those among them whose last message belongs to a moment
   std::uint64_t memory = 64 << 20;  ///< bytes of messages read ahead
-  std::function<void()> on_news;    ///< advance() has something to do before its time; from another thread
+  std::function<void()> on_news;    ///< called from another thread: advance() has something to do before its time
 };
 
 /// Decides what goes out when; who sends it, and which clock runs, is its caller's business:
@@ -35,9 +35,9 @@ struct PlaybackOptions {
 ///   while (auto next = *playback.advance(now); next …) wait until `next`, or for on_news or a command
 ///
 /// Moments   offsets count from the bag's first message. At an offset everything before it is
-///           past, what was recorded exactly then comes next. Where playback is put (by seek(), at
-///           a start offset, at the next pass of a loop) the sink is told the moment: the last
-///           message of every state topic before it.
+///           past, and what was recorded exactly then comes next. Whenever playback is put somewhere
+///           (by seek(), at a start offset, at the next pass of a loop) the sink is told the moment
+///           there: the last message of every state topic before it.
 /// Spacing   every message is due at its log time on one Timeline, so that delays do not add up.
 ///           The time it takes to find a place in the bag is not part of it.
 /// Threads   one; reading has its own.
@@ -46,9 +46,9 @@ class Playback {
   class Sink {
    public:
     virtual ~Sink() = default;
-    /// In the order of their times; equal times in the order of the bag. `due`: when it was to go out.
+    /// Takes messages in the order of their times; equal times in the order of the bag. `due`: when it was to go out.
     virtual void on_message(const Message& message, TimePoint due) = 0;
-    /// Playback goes on from here. Empty where nothing was before.
+    /// Takes the moment from which playback goes on; empty where nothing was before it.
     virtual void on_moment(const std::vector<Message>& state) = 0;
   };
 
@@ -71,7 +71,7 @@ class Playback {
 
   void pause(TimePoint now);
   void resume(TimePoint now);
-  /// Stands still after one message more.
+  /// Sends one message more, then stands still.
   void step(TimePoint now);
   /// Goes to an offset, or as close as start and duration allow.
   void seek(std::chrono::nanoseconds offset);
@@ -104,11 +104,11 @@ class Playback {
 
   PlaybackOptions options_;
   Sink& sink_;
-  const Time zero_, first_, last_;  // of the bag; of what is played of it
+  const Time zero_, first_, last_;  // the bag's first message; begin and end of what is played
   ReadAhead ahead_;
   Timeline timeline_;
-  // Where a place is being found: until the reader has found it, the sink has been told, and
-  // the clock has been set to it.
+  // How far a seek is: the reader still looks for the place, or the sink was told and the clock must
+  // be set, or there is none.
   enum class Seeking { kReads, kTold, kNo } seeking_ = Seeking::kReads;
   Time target_;
   bool paused_;

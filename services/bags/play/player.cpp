@@ -12,6 +12,7 @@
 #include <mutex>
 #include <set>
 
+#include "idl/types/time.hpp"
 #include "services/bags/play/control.hpp"
 #include "services/bags/play/progress.hpp"
 #include "services/bags/play/publisher.hpp"
@@ -33,8 +34,6 @@ constexpr auto kRateWindow = 1s;   // over which rates of topics are counted
 constexpr auto kLastSamples = 2s;  // for readers to receive them before writers go
 constexpr std::size_t kRememberedControls = 64;
 constexpr std::size_t kWaitingControls = 256;
-
-double seconds(std::chrono::nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 /// Ends a wait of poll(2) from any thread.
 class WakeUp {

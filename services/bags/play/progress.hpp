@@ -17,7 +17,7 @@ struct Progress {
   std::vector<std::pair<std::string, double>> topics;  ///< messages per second, at present
 };
 
-/// "[=====>      ]  12.3/60.0 s  x2  playing  loop  230/s  /objects/states 100/s ...": bar, time,
+/// Writes "[=====>      ]  12.3/60.0 s  x2  playing  loop  230/s  /objects/states 100/s ...": bar, time,
 /// rate, state, all messages, and the busiest topics as far as `width` goes.
 std::string progress_line(const Progress& progress, std::size_t width);
 

@@ -16,9 +16,9 @@ namespace jostle::bags {
 
 /// Writes every message as it is in the bag, with what its first writer offered.
 ///
-/// Moments   what writers keep for late readers is dropped and the moment's messages are written
-///           instead: a late reader that asks for kept samples gets those of that moment, not of
-///           another one that was played before.
+/// Moments   what writers keep for late readers is dropped, and the moment's messages are written
+///           instead. So a late reader that asks for kept samples gets those of that moment, not
+///           those of one that was played before.
 /// Threads   one.
 class Publisher final : public Playback::Sink {
  public:
@@ -28,12 +28,12 @@ class Publisher final : public Playback::Sink {
   void on_message(const Message& message, TimePoint due) override;
   void on_moment(const std::vector<Message>& state) override;
 
-  /// For while playback stands: the newest message of a state topic again if it has readers that
-  /// were not there before. Most readers of states ask for no kept samples, and no next one comes.
+  /// Sends the newest message of a state topic again if the topic has new readers. Called while playback stands:
+  /// no next message comes then, and most readers of states ask for no kept samples.
   /// Latched topics need none of this.
   void tell_newcomers();
 
-  /// Topics with fewer readers than that.
+  /// Returns the topics that have fewer readers.
   std::vector<std::string> lacking(int readers) const;
 
   /// Whether all readers had everything by the deadline.
@@ -51,8 +51,8 @@ class Publisher final : public Playback::Sink {
     bool keeps = false;      // samples for late readers
     bool is_retold = false;  // see tell_newcomers()
     std::uint64_t sent = 0;
-    std::vector<std::byte> newest;  // of a topic that is retold
-    int readers = 0;                // of it, when last looked at
+    std::vector<std::byte> newest;  // kept if the topic is retold
+    int readers = 0;                // how many it had when last looked at
   };
 
   Output& output(int topic) { return outputs_[by_topic_.at(static_cast<std::size_t>(topic))]; }

@@ -27,9 +27,9 @@ class ReadAhead {
  public:
   struct Options {
     std::vector<int> topics;          ///< indices of BagInfo::topics, at least one
-    std::vector<int> state_topics;    ///< of these, whose last messages make a moment
+    std::vector<int> state_topics;    ///< those among them whose last messages make a moment
     std::uint64_t memory = 64 << 20;  ///< bytes of messages to hold; one message more is held
-    std::function<void()> on_news;    ///< something new can be taken; must be quick
+    std::function<void()> on_news;    ///< called when something new can be taken; must be quick
   };
 
   ReadAhead(std::unique_ptr<BagReader> reader, Options options);
@@ -55,8 +55,8 @@ class ReadAhead {
  private:
   bool has_news() const;
   void work(const std::stop_token& stop);
-  // What a seek asks for, and one message more. The lock is held around them, not while they
-  // read; both say whether a caller that had nothing to take now has.
+  // restart() reads what a seek asks for, fetch() one message more. Both are called with the lock and give it
+  // up while they read; both return whether a caller that had nothing to take now has something.
   bool restart(std::unique_lock<std::mutex>& lock);
   bool fetch(std::unique_lock<std::mutex>& lock);
 

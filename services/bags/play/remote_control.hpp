@@ -20,8 +20,8 @@ struct RemoteOptions {
 };
 
 /// Tells the playback of the domain one control after the other; each is done when the next one
-/// is told: a seek has found its place, a step has sent its message. Gives the status after the
-/// last one; without controls the present one.
+/// is told: a seek has found its place, a step has sent its message. Returns the status after the
+/// last control; without controls the present one.
 /// Errors   kUnavailable      no playback there, or no answer in time
 ///          kInvalidArgument  what the playback refused
 ///          kCancelled, those of Participant::open

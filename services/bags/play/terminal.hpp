@@ -8,9 +8,9 @@
 
 namespace jostle::bags {
 
-/// Standard input without waiting for the end of a line, without echo. Ctrl-C stays a
+/// A Keyboard reads standard input without waiting for the end of a line, and without echo. Ctrl-C stays a
 /// signal; Ctrl-Z and Ctrl-S, which would leave a playback standing, do nothing.
-/// Restored when this is destroyed. Does nothing unless standard input is a terminal
+/// The terminal is restored when this is destroyed. Does nothing unless standard input is a terminal
 /// and this program in its foreground.
 class Keyboard {
  public:

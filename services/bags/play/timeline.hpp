@@ -1,14 +1,13 @@
 #pragma once
 /// \file
-/// Timeline: which moment of a bag a moment of the steady clock is.
+/// Timeline: which moment of a bag belongs to a moment of the steady clock.
 
 #include <chrono>
 
+#include "idl/types/time.hpp"
 #include "services/bags/format/message.hpp"
 
 namespace jostle::bags {
-
-using TimePoint = std::chrono::steady_clock::time_point;
 
 /// A clock that shows bag time, stands or runs, and can be set.
 ///
@@ -22,8 +21,8 @@ class Timeline {
 
   Time at(TimePoint now) const;
 
-  /// When a moment of the bag is reached, past ones included; TimePoint::max() for one ahead
-  /// while the clock stands, and for what is more than a century away.
+  /// When a moment of the bag is reached, or was. TimePoint::max() for a moment ahead
+  /// while the clock stands, and for one that is more than a century away.
   TimePoint when(Time moment) const;
 
   void set(Time moment, TimePoint now);

@@ -19,14 +19,14 @@ struct TopicChoice {
   bool with_clock = false;                                  ///< /clock shows the bag's time: a recorded one is left out
 };
 
-/// "/from:=/to". Error kInvalidArgument.
+/// Reads "/from:=/to". Error kInvalidArgument.
 Result<std::pair<std::string, std::string>> parse_remap(const std::string& text);
 
 struct PlayedTopic {
   int topic = 0;        ///< index of BagInfo::topics
   std::string name;     ///< as ROS 2 shows it when played
   wire::RawTopic wire;  ///< with what its writer offered
-  /// Its last message belongs to a moment: that of a latched topic, and of a state. States are
+  /// Whether its last message belongs to a moment: it does for latched topics and for states. States are
   /// the system's own topics of kind kState (topics.hpp): /joint_states, /tf, /robot/status and
   /// so on, in a namespace or not.
   bool is_state = false;
@@ -43,7 +43,7 @@ struct TopicPlan {
 /// (velocities, trajectories, goals).
 bool commands_somebody(const Topic& topic);
 
-/// All that the choice selects, but for topics that command somebody: those are played only if
+/// Plans to play all topics that the choice selects, but for those that command somebody: they are played only if
 /// a glob without wildcards or a remap names them.
 /// Errors   kInvalidArgument  nothing is left, a remap of a topic that is not there, two types on one topic
 Result<TopicPlan> plan_topics(const BagInfo& bag, const TopicChoice& choice);

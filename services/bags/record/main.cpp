@@ -76,7 +76,7 @@ class Line {
   double seconds_ = 0.0;
 };
 
-// Of this process, all threads.
+// CPU time of this process, all threads.
 double cpu_seconds() {
   timespec used{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);

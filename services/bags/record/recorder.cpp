@@ -29,7 +29,7 @@ Time wall_clock() {
   return now.count();
 }
 
-// Of the disk that a file will be on; its folder may not be there yet.
+// Free bytes of the disk that a file will be on; its folder may not be there yet.
 Result<std::uint64_t> free_disk(std::filesystem::path place) {
   std::error_code ignored;
   place = std::filesystem::absolute(place, ignored);

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// Recorder: what is said in a domain, into a bag.
+/// Recorder: writes what is said in a domain into a bag.
 
 #include <atomic>
 #include <chrono>
@@ -23,7 +23,7 @@
 namespace jostle::bags {
 
 struct RecordOptions {
-  std::filesystem::path folder;  ///< of the bag; with a ring, bags are FOLDER-1, FOLDER-2, … as far as they are free
+  std::filesystem::path folder;  ///< the bag's; with a ring, bags are FOLDER-1, FOLDER-2, … as far as they are free
   Selection selection;
   BagOptions bag;
   std::chrono::nanoseconds ring{0};      ///< keep so much, and write it when asked to; 0: write everything
@@ -37,14 +37,14 @@ struct RecordOptions {
 
 struct TopicCount {
   std::uint64_t messages = 0;  ///< written
-  /// Did not come (gaps in what a writer numbers), had no room in memory, or could not be written.
+  /// Messages that did not come (gaps in a writer's numbers), had no room in memory, or could not be written.
   std::uint64_t lost = 0;
 };
 
 struct RecordStatus {
   double seconds = 0.0;        ///< since the start
   std::uint64_t messages = 0;  ///< written, or in the ring
-  std::uint64_t bytes = 0;     ///< of the files, or of the ring
+  std::uint64_t bytes = 0;     ///< size of the files, or of the ring
   std::uint64_t lost = 0;
   std::uint64_t free_disk = 0;  ///< bytes
   int topics = 0;               ///< with messages
@@ -76,14 +76,14 @@ class Recorder {
     std::function<void(const std::filesystem::path&)> on_snapshot;  ///< a bag of the ring is complete
   };
 
-  /// Subscribed when this returns.
+  /// Starts a recorder, which is subscribed when this returns.
   /// Errors   kInvalidArgument  the folder exists, less free disk than min_free, a selection without
   ///                            results for until_result, a domain that is none
   ///          kIo, kUnavailable
   static Result<std::unique_ptr<Recorder>> start(RecordOptions options, Watcher watcher);
   ~Recorder();
 
-  /// Writes until a stop is requested, or what else ends it. Once.
+  /// Writes until a stop is requested, or something else ends it. May be called once.
   RecordReport run(std::stop_token stop);
 
   /// Writes the ring, soon. From any thread, from signal handlers too.
@@ -96,10 +96,10 @@ class Recorder {
   using Clock = std::chrono::steady_clock;
   class OpenBag;
 
-  // Of a topic: samples, and what does not change once there is one.
+  // Counts a topic's samples, and knows what does not change once there is one.
   struct Tally {
     std::uint64_t written = 0, unwritten = 0;
-    std::uint64_t safe = 0;  // of the written ones, those that the operating system has
+    std::uint64_t safe = 0;  // those written that the operating system has
     bool known = false;
     bool latched = false, is_result = false;
   };

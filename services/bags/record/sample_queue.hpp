@@ -23,19 +23,19 @@ struct QueuedSample {
   std::uint64_t memory() const { return sizeof *this + data.size(); }
 };
 
-/// Takes in samples without ever waiting for whoever takes them out: what has no room is
-/// counted as lost.
+/// A SampleQueue takes in samples without ever waiting for whoever takes them out. Samples without room
+/// in memory are counted as lost.
 ///
 /// Threads  push from any, take from one.
 class SampleQueue {
  public:
-  /// `capacity` in bytes, of what is in the queue and what the last take() gave out.
+  /// `capacity`: bytes, for what is in the queue and what the last take() gave out together.
   explicit SampleQueue(std::uint64_t capacity) : capacity_(capacity) {}
 
   /// Copies the sample and stamps it. False if there was no room.
   bool push(int topic, std::span<const std::byte> data, Time publish_time);
 
-  /// Everything there is, in the order of log times. Waits for a good deal of it until the
+  /// Takes everything there is, in the order of log times. Waits for a good deal of it until the
   /// deadline; returns at once after a stop request.
   std::vector<QueuedSample> take(std::chrono::steady_clock::time_point deadline, std::stop_token stop);
 

@@ -8,10 +8,11 @@
 
 namespace jostle::bags {
 
-/// Numbers that come about in order. Memory for a thousand gaps; older ones are filled no more.
+/// A SequenceSet remembers numbers that come roughly in order, with up to a thousand gaps. Older gaps are forgotten:
+/// they stay gaps.
 class SequenceSet {
  public:
-  /// False for one that was here before, or that is older than what is remembered.
+  /// Takes in a number. False for one that was here before, or that is older than what is remembered.
   bool insert(std::uint64_t number) {
     if (number < oldest_) return false;
     auto next = spans_.upper_bound(number);
@@ -38,7 +39,7 @@ class SequenceSet {
     return true;
   }
 
-  /// Between the first and the last one seen.
+  /// Counts the numbers that are missing between the first and the last one seen.
   std::uint64_t missing() const { return count_ == 0 ? 0 : last_ - first_ + 1 - count_; }
 
  private:

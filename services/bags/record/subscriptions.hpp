@@ -20,8 +20,8 @@ namespace jostle::bags {
 /// Subscribes
 ///
 ///   to the system's own topics at once, asking for what their writers keep;
-///   to every other topic as soon as a writer or a reader of it is found, and asks for what
-///   the writer offers: one that keeps its last samples is asked for them.
+///   to every other topic as soon as a writer or a reader of it is found, asking for what
+///   the writer offers: a writer that keeps its last samples is asked for them.
 ///
 /// A writer that offers less than the readers so far ask for gets a reader of its own. A sample
 /// that comes to two readers counts once. Says why a topic is left out: a type whose definition
@@ -32,34 +32,34 @@ class Subscriptions {
   struct Options {
     std::optional<int> domain;
     Selection selection;
-    /// Text of a type such as "jostle_msgs/msg/Goal", or nothing if it is unknown.
+    /// Returns the text of a type such as "jostle_msgs/msg/Goal", or nothing if it is unknown.
     std::function<std::optional<std::string>(const std::string& type)> definition;
-    /// On the middleware's threads, maybe several at once. `topic` is an index for topic().
+    /// Called on the middleware's threads, maybe on several at once. `topic` is an index for topic().
     std::function<void(int topic, std::span<const std::byte>, const wire::Origin&)> on_sample;
-    /// On a thread of this class.
+    /// Called on a thread of this class.
     std::function<void(const std::string&)> on_warning;
   };
 
   /// Every reader of the system's own topics is there when this returns.
-  /// Errors   of Participant::open, kUnavailable
+  /// Errors   those of Participant::open, kUnavailable
   static Result<std::unique_ptr<Subscriptions>> open(Options options);
   ~Subscriptions();
 
   const wire::Participant& participant() const;
 
   int topics() const;
-  /// Name, type, definition, and what its first writer offered.
+  /// Returns a topic's name, type, definition, and what its first writer offered.
   Topic topic(int index) const;
 
-  /// Samples between the first and the last one of each writer that did not come.
+  /// Counts the samples that did not come, between the first and the last one of each writer.
   std::uint64_t missing(int topic) const;
 
-  /// Topics that are written and subscribed to, and no writer of which a reader here could be
-  /// matched with: it offers what nobody asks for, exclusive ownership, say. With the number of
+  /// Returns the topics that are written and subscribed to, yet none of whose writers matches a reader here, because
+  /// they offer what no reader asks for: exclusive ownership, say. With the number of
   /// refusals that the middleware tells of. No topic is subscribed to after this.
   std::vector<std::pair<std::string, std::uint64_t>> unmatched();
 
-  /// No on_sample follows.
+  /// Ends all callbacks: no on_sample follows.
   void close();
 
  private:

@@ -11,7 +11,7 @@
 
 namespace jostle::bags {
 
-/// What time is: the world's own, which may stand still while somebody plans, or that of
+/// Whose time counts: the world's own, which may stand still while somebody plans, or that of
 /// whoever watched.
 enum class RunClock { kWorld, kWall };
 
@@ -21,20 +21,20 @@ class RecordedMotion {
   struct Sample {
     double time = 0.0;  ///< s since the run's first sample
     State state;        ///< v stays empty
-    int action = 0;     ///< that was executed last, or is being executed
-    int plan = -1;      ///< that was made last; -1: none yet
+    int action = 0;     ///< the action that was executed last, or is being executed
+    int plan = -1;      ///< the plan that was made last; -1: none yet
   };
 
-  /// From the robot's and the objects' states of a bag; from the run's observations where
-  /// it has none of those.
+  /// Reads the robot's and the objects' states from a bag; the run's observations where
+  /// the bag has no states.
   /// Errors   kInvalidArgument  a state that does not fit the scene; those of BagReader
   static Result<RecordedMotion> read(BagReader& reader, const RecordedRun& run, const StateLayout& layout,
                                      RunClock clock);
 
   double duration() const { return samples_.back().time; }  ///< s
 
-  /// Between two samples positions go straight and rotations turn evenly. Before the
-  /// first and after the last it stands still.
+  /// Interpolates: between two samples positions go straight and rotations turn evenly. Before the
+  /// first and after the last one, everything stands still.
   Sample at(double time) const;
 
  private:

@@ -15,9 +15,9 @@
 
 namespace jostle::bags {
 
-/// A recorded GoalResult: as it is now, or as it was before `ending` was added at its end, which is
+/// Reads a recorded GoalResult: as it is now, or as it was before `ending` was added at its end, which is
 /// then kUnknown.
-/// Error kInvalidArgument: neither.
+/// Error kInvalidArgument: it is neither.
 Result<jostle_msgs::msg::GoalResult> result_from_cdr(std::span<const std::byte> data);
 
 /// How a recorded run ended. The one place that reads it from the sentence: results recorded before
@@ -33,15 +33,15 @@ struct RecordedRun {
   std::vector<jostle_msgs::msg::Plan> plans;                ///< entry i has number i
   std::optional<jostle_msgs::msg::GoalResult> result;       ///< nothing: the recording ends before
 
-  /// Whether it came to an end of its own, rather than being cancelled, timed out or cut off.
+  /// Whether the run came to an end of its own, rather than being cancelled, timed out or cut off.
   bool concluded() const;
 };
 
-/// The run of a goal, or every run.
+/// Returns the run of a goal, or every run if `goal_id` is empty.
 /// Error kNotFound if there is no such goal; names those there are.
 Result<std::vector<RecordedRun>> select_runs(std::vector<RecordedRun> runs, const std::string& goal_id);
 
-/// Every run of a bag, in the order they were taken up. Topics are found by their types,
+/// Reads every run of a bag, in the order they were taken up. Topics are found by their types,
 /// whatever namespace they are in.
 /// Errors   kNotFound         no run in it; says what there is and the remedy
 ///          kInvalidArgument  an observation or a plan is missing; names it

@@ -27,18 +27,18 @@ struct Difference {
 struct Decisions {
   std::vector<jostle_msgs::msg::Observation> observations;
   std::vector<jostle_msgs::msg::Plan> plans;
-  bool asked_for_more = false;  ///< acted once more after the last recorded observation
+  bool asked_for_more = false;  ///< whether it acted once more after the last recorded observation
 };
 
 struct Comparison {
-  std::size_t plans = 0, equal_plans = 0;  ///< of the recorded ones
+  std::size_t plans = 0, equal_plans = 0;  ///< recorded ones, and those that the replay made the same
   std::size_t actions = 0, equal_actions = 0;
   std::optional<Difference> first;  ///< nothing: bit-equal
 
   bool bit_equal() const { return !first; }
 };
 
-/// The first difference of two plans for the same place in a run, if any.
+/// Finds the first difference of two plans for the same place in a run, if any.
 std::optional<Difference> compare(const StateLayout& layout, const jostle_msgs::msg::Plan& recorded,
                                   const jostle_msgs::msg::Plan& replayed);
 

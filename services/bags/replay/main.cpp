@@ -7,8 +7,8 @@
 #include "physics_pool/local/thread_pool.hpp"
 #include "services/bags/replay/report.hpp"
 #include "services/common/process/cores.hpp"
-#include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
+#include "services/common/results/results.hpp"
 
 namespace jostle::bags {
 namespace {
@@ -56,7 +56,7 @@ int perform(Arguments arguments, std::stop_token stop) {
     json["runs"].push_back(to_json(run, *report_result));
   }
   if (!arguments.json.empty()) {
-    if (auto ok = common::write_text(arguments.json, json.dump(1) + "\n"); !ok) return fail(ok.error());
+    if (auto ok = common::write_results(arguments.json, json); !ok) return fail(ok.error());
   }
   return equal ? common::kExitOk : common::kExitFailed;
 }

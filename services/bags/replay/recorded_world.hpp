@@ -15,19 +15,19 @@
 namespace jostle::bags {
 
 /// Gives out one recorded observation after the other, whatever it is commanded: the next
-/// one follows a command that a robot would take. After the last there is none, and a command ends with kCancelled.
+/// one follows any command that a robot would take. After the last one, a command ends with kCancelled.
 ///
 /// Threads  one.
 class RecordedWorld {
  public:
-  /// `limits`: of the recorded robot's axes, m/s or rad/s. `rate`: recorded seconds per second; 0: as fast as it is
-  /// asked. The run outlives it.
+  /// `limits`: largest speeds of the recorded robot's axes, m/s or rad/s. `rate`: recorded seconds per second; 0: as
+  /// fast as it is asked. The run outlives it.
   RecordedWorld(const RecordedRun& run, std::vector<double> limits, double rate);
 
   class Robot;
   class Objects;
 
-  double time() const;                           ///< of the present observation, s of the world's clock
+  double time() const;                           ///< when the present observation was made, s of the world's clock
   bool asked_for_more() const { return over_; }  ///< a command came after the last observation
 
  private:

@@ -17,7 +17,7 @@ namespace jostle::bags {
 struct ReplayOptions {
   std::vector<std::string> settings;  ///< KEY=VALUE, see apply_changes(); empty: as recorded
   double rate = 0.0;  ///< recorded seconds per second between observations; 0: as fast as they are wanted
-  /// Hears of every plan, and what it is at that place in the recording (or null).
+  /// Called for every plan, with the recorded plan at the same place (or null).
   std::function<void(const jostle_msgs::msg::Plan& replayed, const jostle_msgs::msg::Plan* recorded,
                      const StateLayout& layout)>
       on_plan;

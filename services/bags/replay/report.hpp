@@ -9,14 +9,14 @@
 
 namespace jostle::bags {
 
-/// One line about the recorded run.
+/// Writes one line about the recorded run.
 std::string headline(const RecordedRun& recorded);
 
-/// One line about a plan; `recorded` may be null.
+/// Writes one line about a plan; `recorded` may be null.
 std::string plan_line(const jostle_msgs::msg::Plan& replayed, const jostle_msgs::msg::Plan* recorded,
                       const StateLayout& layout);
 
-/// The verdict; where the runs part, what differs there, why, and how much they agree.
+/// Writes the verdict: where the runs part, what differs there, why, and how much they agree.
 std::string verdict(const RecordedRun& recorded, const ReplayReport& report);
 
 nlohmann::json to_json(const RecordedRun& recorded, const ReplayReport& report);

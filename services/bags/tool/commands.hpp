@@ -16,7 +16,7 @@ struct InfoArguments {
   std::filesystem::path bag;
   bool as_json = false;
 };
-/// What a bag holds, without reading its messages.
+/// Shows what a bag holds, without reading its messages.
 int show_info(const InfoArguments& arguments);
 
 /// Reads everything. kExitFailed at the first thing that is not as it should be.
@@ -37,10 +37,10 @@ struct ExportArguments {
   std::optional<double> from, to;   ///< s since the bag's start
   std::string output;               ///< CSV: a folder; JSON: a file; "-": standard output
 };
-/// Decoded messages. Leaves nothing behind when it is interrupted or cannot write.
+/// Writes decoded messages. Leaves nothing behind when it is interrupted or cannot write.
 int export_bag(const ExportArguments& arguments, std::stop_token stop);
 
-/// "jostle bag: …" on standard error; the exit code for it: kExitInterrupted after kCancelled,
+/// Prints "jostle bag: …" on standard error and returns the exit code: kExitInterrupted after kCancelled,
 /// kExitUsage for what the user named wrongly, else `otherwise`.
 int fail(const Error& error, int otherwise);
 

@@ -14,12 +14,12 @@ namespace jostle::bags {
 
 class Decoders {
  public:
-  /// By the bag's own definitions; by ours where it brings none. A definition that is
+  /// Makes decoders from the bag's own definitions; from ours where it brings none. A definition that is
   /// malformed is as good as none.
   explicit Decoders(const BagInfo& info);
 
   bool has(int topic) const { return decoders_.at(static_cast<std::size_t>(topic)).has_value(); }
-  /// Why not.
+  /// Why a topic has none.
   const std::string& reason(int topic) const { return reasons_.at(static_cast<std::size_t>(topic)); }
   /// Error as Decoder's, with the topic in front.
   Result<nlohmann::ordered_json> decode(const Message& message) const;
@@ -27,7 +27,7 @@ class Decoders {
  private:
   std::vector<std::string> names_, reasons_;
   std::vector<std::optional<Decoder>> decoders_;
-  std::vector<std::optional<Decoder>> earlier_;  // of bags from before a field was appended
+  std::vector<std::optional<Decoder>> earlier_;  // for bags from before a field was appended
 };
 
 }  // namespace jostle::bags

@@ -10,12 +10,12 @@
 
 namespace jostle::common {
 
-/// Those of Okabe and Ito, "Color Universal Design", 2008, which colour-blind eyes can
+/// The colours of Okabe and Ito, "Color Universal Design", 2008, which colour-blind eyes can
 /// tell apart, and one more.
 inline constexpr std::array kColours{"#000000", "#E69F00", "#56B4E9", "#009E73",
                                      "#D55E00", "#CC79A7", "#0072B2", "#999933"};
 
-/// A gnuplot string in which nothing but the quote has a meaning.
+/// Makes a gnuplot string in which nothing but the quote has a meaning.
 std::string quoted(const std::string& text);
 
 /// Runs a script that draws `picture`, whose folder it makes.

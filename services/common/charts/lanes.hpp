@@ -21,7 +21,7 @@ struct LaneChart {
   std::vector<std::string> lanes;   ///< top to bottom
   std::vector<std::string> series;  ///< as the legend names them, a colour each; the eighth has the first's again
   std::string hatched;              ///< what hatched bars are; empty: not in the legend
-  double length = 0.0;              ///< of a lane; where no bar is, its ground shows
+  double length = 0.0;              ///< a lane's, in units of x; where no bar is, its ground shows
   std::vector<Bar> bars;
 };
 
@@ -29,7 +29,7 @@ struct LaneChart {
 /// Error kInvalidArgument naming the endings.
 Result<void> check_picture(const std::filesystem::path& picture);
 
-/// As a PNG or, if the file's name ends so, as an SVG.
+/// Draws a PNG or, if the file's name ends so, an SVG.
 /// Errors   kInvalidArgument  another ending, no lanes, a length that is not positive, or
 ///                            a bar in no lane or series
 ///          kNotFound, kIo    see run_gnuplot

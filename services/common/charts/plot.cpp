@@ -47,7 +47,7 @@ std::string data_of(const Band& band, const std::string& name) {
   return text + "EOD\n";
 }
 
-// Of a logarithmic axis: its range, and as many tics per decade as have room;
+// Makes an axis logarithmic, with its range and as many tics per decade as have room;
 // gnuplot alone would widen the range to whole decades.
 std::string logarithmic(char axis, const std::vector<double>& values) {
   double least = HUGE_VAL, most = 0.0;

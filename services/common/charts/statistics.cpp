@@ -52,7 +52,7 @@ Share wilson_interval(int successes, int runs) {
   const double n = runs, p = successes / n;
   const double centre = (p + z * z / (2 * n)) / (1 + z * z / n);
   const double half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
-  // Of none or all the bound is 0 or 1, but for rounding.
+  // If none or all succeed, a bound is 0 or 1, but for rounding.
   return {
       .successes = successes, .runs = runs, .low = std::max(centre - half, 0.0), .high = std::min(centre + half, 1.0)};
 }

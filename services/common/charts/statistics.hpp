@@ -10,14 +10,14 @@ struct Interval {
   double low = 0.0, high = 0.0;
 };
 
-/// The value that a fraction p in [0, 1] of the values lies below, interpolated
+/// Returns the value that a fraction p in [0, 1] of the values lies below, interpolated
 /// between neighbours; values must not be empty.
 double quantile(std::vector<double> values, double p);
 
 inline double median(std::vector<double> values) { return quantile(std::move(values), 0.5); }
 
-/// Where the median of whatever the values are drawn from lies with 90 %
-/// confidence or more; the smallest and the largest value while there are too
+/// Says where the median of the distribution that the values are drawn from lies, with 90 %
+/// confidence or more: between the smallest and the largest value while there are too
 /// few (four or fewer) to be so sure. values must not be empty.
 ///
 /// Source   the sign test: of n values, fewer than k lie below the median with

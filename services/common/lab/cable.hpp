@@ -15,13 +15,13 @@
 namespace jostle::common {
 
 /// What happens to each frame that leaves a host; those that come to it pass as they
-/// are. So does netem at the interface of each host (`tc qdisc add dev eth root netem
+/// are. It is so with netem at the interface of each host, too (`tc qdisc add dev eth root netem
 /// delay 5ms loss 1%`): between two hosts a frame takes `delay` and is lost with
 /// probability `loss`, a round trip takes twice the delay.
 struct LinkQuality {
   std::chrono::microseconds delay{0};  ///< >= 0
   double loss = 0.0;                   ///< probability in [0, 1]
-  std::uint64_t seed = 1;              ///< of the losses
+  std::uint64_t seed = 1;              ///< what the losses are drawn from
 
   bool perfect() const { return delay.count() == 0 && loss == 0.0; }
 };
@@ -54,7 +54,7 @@ class Cables {
   Cables(const Cables&) = delete;
   Cables& operator=(const Cables&) = delete;
 
-  /// Takes two non-blocking TAP devices, and closes them in the end. Not after start().
+  /// Takes two non-blocking TAP devices, and closes them in the end. Must not be called after start().
   void add(int host_end, int switch_end);
   void start();
 

@@ -20,7 +20,7 @@ namespace jostle::common {
 ///          calls safe from any thread.
 class Hosts {
  public:
-  /// `quality`: of every cable, see there.
+  /// `quality`: that of every cable.
   /// Errors   kInvalidArgument  count
   ///          kUnavailable      no right to make namespaces, no `ip`, no TAP devices; says the remedy
   static Result<std::unique_ptr<Hosts>> make(int count, const LinkQuality& quality = {});
@@ -30,11 +30,11 @@ class Hosts {
 
   int count() const { return static_cast<int>(hosts_.size()); }
 
-  /// Of a host, from 1.
+  /// The address of a host; hosts are numbered from 1.
   static std::string address(int host);
 
   /// Runs `act` on the host's thread and waits: what it starts, threads and processes,
-  /// lives on that host. At once if this is that thread; else after whatever runs there.
+  /// lives on that host. It runs at once if this is that thread; else after whatever runs there.
   /// Exceptions of `act` come through.
   void on(int host, const std::function<void()>& act) const;
 

@@ -17,7 +17,7 @@ namespace jostle::common {
 /// How a process ended. Programs are compared by `code` and `signal`; the text is for people.
 struct ExitStatus {
   int code = -1;   ///< as exit(3) was given it; -1: a signal ended it, or nobody knows how it ended
-  int signal = 0;  ///< that ended it; 0: none
+  int signal = 0;  ///< the signal that ended it; 0: none
 
   bool ok() const { return code == 0; }
   std::string text() const;  ///< "exit code 1", "killed by signal 9 (Killed)"
@@ -46,10 +46,10 @@ class ChildProcess {
   /// Waits until it has ended, and says how.
   ExitStatus wait();
 
-  /// The same, for so long at most.
+  /// Does the same, for so long at most; nothing if it still runs then.
   std::optional<ExitStatus> wait_for(std::chrono::milliseconds patience);
 
-  /// Whether it has printed that so far.
+  /// Whether it has printed `text` so far.
   bool has_said(const std::string& text) const;
 
   /// Asks it to end, without waiting.

@@ -14,7 +14,8 @@ namespace {
 
 constexpr int kLargestDomain = 232;  // RTPS 2.2, 9.6.1.1: ports would pass 65535 beyond
 
-// Of "8080,9148-9150", as net.ipv4.ip_local_reserved_ports has it: the kernel gives these to nobody.
+// Whether all ports from `first` to `last` are in net.ipv4.ip_local_reserved_ports, which reads like "8080,9148-9150":
+// the kernel gives these to nobody.
 bool all_reserved(int first, int last) {
   std::ifstream in("/proc/sys/net/ipv4/ip_local_reserved_ports");
   int next = first;  // lists are sorted

@@ -1,6 +1,7 @@
 #pragma once
 /// \file
-/// Two worlds on one domain would speak into each other's topics.
+/// DomainClaim: keeps a second process of the same role off a domain. Two worlds on one domain
+/// would speak into each other's topics.
 
 #include <chrono>
 #include <string>
@@ -12,12 +13,12 @@ namespace jostle::common {
 /// A role that only one process of a machine may have on a DDS domain, or in a namespace of it. Held
 /// until it is destroyed or the process ends, however it ends.
 ///
-/// A bound socket without a file: there is nothing to clean up, and it reaches
+/// It is a bound socket without a file: there is nothing to clean up, and it reaches
 /// exactly as far as loopback traffic does, the network namespace.
 class DomainClaim {
  public:
-  /// `role`: a few words; `space`: the namespace it is in, "" for none. Waits up to `patience` for a predecessor that
-  /// is just ending. Error kUnavailable if another process has the role.
+  /// Takes a role. `role`: a few words; `space`: the namespace it is in, "" for none. Waits up to `patience` for a
+  /// predecessor that is just ending. Error kUnavailable if another process has the role.
   static Result<DomainClaim> take(const std::string& role, int domain, std::chrono::milliseconds patience,
                                   const std::string& space = "");
 
@@ -31,14 +32,14 @@ class DomainClaim {
   int socket_;
 };
 
-/// A domain that nobody else on this machine who asked here has.
+/// A domain that claim_some_domain() has given to nobody else on this machine.
 struct OwnDomain {
   int domain = 0;
-  DomainClaim claim;  ///< while it is held
+  DomainClaim claim;  ///< the domain is ours while it is held
 };
 
-/// From 1 to 100: beyond, a domain's UDP ports are among those that Linux gives to sockets that
-/// ask for any (from 32768), and a domain whose port of discovery is somebody's finds nobody.
+/// Claims a domain from 1 to 100. Beyond, a domain's UDP ports are among those that Linux gives to sockets that
+/// ask for any (from 32768), and participants whose discovery port is somebody else's find nobody.
 /// Error kUnavailable if all are taken.
 Result<OwnDomain> claim_some_domain();
 

@@ -9,31 +9,31 @@
 
 namespace jostle::common {
 
-/// The folder this program was started from, links resolved.
+/// Returns the folder this program was started from, links resolved.
 std::filesystem::path program_folder();
 
-/// Where data of the programs in a folder lie: share/jostle of the nearest folder
+/// Returns where data of the programs in a folder lie: share/jostle of the nearest folder
 /// above that has one. Programs in build/bin find build/share/jostle, those in
-/// /usr/libexec/jostle find /usr/share/jostle. If there is none, the one that
+/// /usr/libexec/jostle find /usr/share/jostle. If there is none, it is the one that
 /// would lie beside, for a message to name.
 std::filesystem::path share_folder(const std::filesystem::path& programs);
 
-/// A data file of the project, `name` such as "experiments/chapter3.yaml", in the
+/// Returns a data file of the project, `name` such as "experiments/chapter3.yaml", in the
 /// share folder of this program.
 std::filesystem::path data_file(const std::string& name);
 
-/// A coarse model's name for make_coarse_model: `learned` alone means the network that
+/// Turns a coarse model's name into one for make_coarse_model: `learned` alone means the network that
 /// comes along, models/coarse-sliders.net.
 std::string coarse_model_name(const std::string& name);
 
-/// Error kIo naming the file.
+/// Reads a whole file. Error kIo naming the file.
 Result<std::string> read_text(const std::filesystem::path& file);
 
-/// Makes missing folders; replaces the file in one step, so that a reader
+/// Writes a whole file. Makes missing folders; replaces the file in one step, so that a reader
 /// never sees half of it. Error kIo naming the file.
 Result<void> write_text(const std::filesystem::path& file, const std::string& text);
 
-/// A new folder that only this user can read, for its caller to remove; `purpose`
+/// Makes a folder that only this user can read, for its caller to remove; `purpose`
 /// becomes part of its name. Error kIo naming it.
 Result<std::filesystem::path> make_temporary_folder(const std::string& purpose);
 

@@ -9,7 +9,7 @@
 
 namespace jostle::common {
 
-/// IPv4 addresses of the network interfaces that are up and have their cable in; loopback
+/// Returns the IPv4 addresses of the network interfaces that are up and have their cable in; loopback
 /// is none of them.
 std::set<std::string> reachable_addresses();
 

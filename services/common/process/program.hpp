@@ -40,33 +40,33 @@ class StopSignal {
 /// Returns once a stop was requested.
 void wait_for(std::stop_token stop);
 
-/// Waits until then, or until a stop is requested: whether the time came.
+/// Waits until `time`, or until a stop is requested; returns whether the time came.
 bool pause_until(std::chrono::steady_clock::time_point time, std::stop_token stop);
 
 /// Ends this process when the one that started it ends, however it ends; at once
 /// if that has happened already. `parent`: its process id; 0 does nothing.
 void die_with_parent(pid_t parent);
 
-/// --discovery, --namespace and --secure, of every program that speaks DDS. They set JOSTLE_DISCOVERY,
+/// Adds --discovery, --namespace and --secure, which every program that speaks DDS has. They set JOSTLE_DISCOVERY,
 /// JOSTLE_NAMESPACE and JOSTLE_SECURE of this process: so whatever it starts joins in the same way.
 void add_network_options(CLI::App& app);
 
 /// What every process of a run can be told, add_network_options() included.
 struct ProcessOptions {
-  std::optional<int> domain;  ///< of DDS; else ROS_DOMAIN_ID, else 0
+  std::optional<int> domain;  ///< DDS domain; else ROS_DOMAIN_ID, else 0
   pid_t parent = 0;           ///< see die_with_parent
 };
 void add_process_options(CLI::App& app, ProcessOptions& options);
 
-/// "participant 00000000deadbeef": how a process says in its log who it is in a domain, for the one
+/// Writes "participant 00000000deadbeef": how a process says in its log who it is in a domain, for the one
 /// that started it. `id`: wire::Participant::id().
 std::string participant_name(std::uint64_t id);
 
-/// Parses the command line. An exit code if the program is to end: after --help,
+/// Parses the command line. Returns an exit code if the program is to end: after --help,
 /// or with kExitUsage after wrong arguments.
 std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv);
 
-/// Log lines go to standard error as "NAME: level: text".
+/// Sends log lines to standard error, as "NAME: level: text".
 void set_up_logging(const std::string& name);
 
 }  // namespace jostle::common

@@ -10,11 +10,11 @@
 
 namespace jostle::common {
 
-/// When lines are written one below the other instead: never, where standard error is no
+/// When lines are written one below the other instead of being drawn over: never, where standard error is no
 /// terminal, or always.
 enum class PlainLines { kNever, kElsewhere, kAlways };
 
-/// On standard error. What is drawn needs a terminal, or plain lines; what is said is always
+/// A LiveLine stands on standard error. What is drawn needs a terminal, or plain lines; what is said is always
 /// written, on a line of its own. Threads  one.
 class LiveLine {
  public:
@@ -23,10 +23,10 @@ class LiveLine {
   LiveLine(const LiveLine&) = delete;
   LiveLine& operator=(const LiveLine&) = delete;
 
-  bool live() const { return live_; }  ///< drawn over
+  bool live() const { return live_; }  ///< whether it is drawn over
   bool visible() const { return live_ || plain_; }
   std::size_t width() const;  ///< characters that fit into it
-  /// ASCII; what does not fit is cut off, unless the line is a plain one.
+  /// Draws ASCII; what does not fit is cut off, unless the line is a plain one.
   void draw(std::string_view text);
   void finish();  ///< leaves the line standing; what comes next has one of its own
   void wipe();    ///< as if nothing had been drawn

@@ -18,15 +18,15 @@ struct ProgressLineOptions {
   bool wiped = false;  ///< at the end, as the result says it all
 };
 
-/// "verifying: " and progress_text() on standard error: drawn over four times a second, plain
-/// lines every half minute; both at the beginning and when all is done. May be called for
+/// A ProgressLine shows "verifying: " and progress_text() on standard error: drawn over four times a second, as plain
+/// lines every half minute; both at the beginning and when all is done. show() may be called for
 /// every small message.
 class ProgressLine {
  public:
   explicit ProgressLine(ProgressLineOptions options);
   ~ProgressLine();
 
-  /// `done` of `total`, of which `found` cost no time.
+  /// Shows that `done` of `total` are done, of which `found` cost no time.
   void show(std::uint64_t done, std::uint64_t total, std::uint64_t found = 0);
 
  private:
@@ -39,12 +39,12 @@ class ProgressLine {
   std::uint64_t next_look_ = 0;  // at the clock: once so many are done
 };
 
-/// "12400 of 300000 transitions (4 %), 96.3 per second, 49 min left", after `seconds`; the
-/// last two while they are known.
+/// Writes "12400 of 300000 transitions (4 %), 96.3 per second, 49 min left", after `seconds`; the
+/// last two only if they are known.
 std::string progress_text(std::string_view unit, std::uint64_t done, std::uint64_t total, double seconds,
                           std::uint64_t found = 0);
 
-/// "48 s", "49 min", "2 h 05 min".
+/// Writes "48 s", "49 min", "2 h 05 min".
 std::string duration_text(double seconds);
 
 }  // namespace jostle::common

@@ -57,7 +57,7 @@ struct RemotePool::Active {
   BatchReply reply;
   double best_cost = kInfinity;
   std::uint32_t first_success = UINT32_MAX;
-  wire::TimePoint started;
+  TimePoint started;
   OnReply on_reply;
   bool ended = false;
 };
@@ -176,7 +176,7 @@ Error RemotePool::no_worker() const {
   return {Code::kUnavailable, std::move(message)};
 }
 
-void RemotePool::give_up_without_workers(wire::TimePoint now) {
+void RemotePool::give_up_without_workers(TimePoint now) {
   std::vector<std::shared_ptr<Active>> hopeless;
   for (const auto& [epoch, active] : active_) {
     if (now >= std::max(last_usable_, active->started) + options_.no_worker_timeout) hopeless.push_back(active);
@@ -189,7 +189,7 @@ void RemotePool::finish(Active& active, Result<BatchReply> reply) {
   active.on_reply(std::move(reply));
 }
 
-// Of a batch that ended, or that nobody waits for any more; the workers may have to be told.
+// Drops a batch that ended, or that nobody waits for any more; workers that still have samples of it are told.
 void RemotePool::forget(Active& active) {
   active.ended = true;
   if (scheduler_.finish(active.epoch)) {
@@ -245,7 +245,7 @@ void RemotePool::send(const Outgoing& outgoing) {
   }
 }
 
-void RemotePool::absorb_heartbeats(wire::TimePoint now, std::vector<WorkerId>& strangers) {
+void RemotePool::absorb_heartbeats(TimePoint now, std::vector<WorkerId>& strangers) {
   for (const msg::WorkerHeartbeat& heartbeat : std::exchange(heartbeats_, {})) {
     const auto writer = assignment_writers_.find(heartbeat.worker());
     if (writer == assignment_writers_.end()) strangers.push_back(heartbeat.worker());
@@ -265,7 +265,7 @@ void RemotePool::absorb_heartbeats(wire::TimePoint now, std::vector<WorkerId>& s
   }
 }
 
-void RemotePool::absorb_results(wire::TimePoint now) {
+void RemotePool::absorb_results(TimePoint now) {
   for (const Received& received : std::exchange(results_, {})) absorb(received, now);
 }
 
@@ -288,7 +288,7 @@ void RemotePool::trace(const Received& received, bool first) const {
                       .finished = seconds(result.finished())});
 }
 
-void RemotePool::absorb(const Received& received, wire::TimePoint now) {
+void RemotePool::absorb(const Received& received, TimePoint now) {
   const msg::AssignmentResult& result = received.result;
   const auto found = active_.find(result.epoch());
   if (found == active_.end()) {
@@ -341,7 +341,7 @@ void RemotePool::adopt(Active& active, RolloutOutcome outcome) {
   active.reply.outcomes[sample - active.batch.first_sample] = std::move(outcome);
 }
 
-void RemotePool::prepare_assignments(wire::TimePoint now) {
+void RemotePool::prepare_assignments(TimePoint now) {
   for (const Assignment& assignment : scheduler_.assign(now)) {
     const Active& active = *active_.at(assignment.epoch);
     AssignmentMessage message;
@@ -362,7 +362,7 @@ physics_pool::PoolStatus RemotePool::status() const {
   return scheduler_.status();
 }
 
-bool RemotePool::wait_for_workers(int count, wire::TimePoint deadline) const {
+bool RemotePool::wait_for_workers(int count, TimePoint deadline) const {
   std::unique_lock lock(mutex_);
   return changed_.wait_until(lock, deadline,
                              [&] { return scheduler_.usable_workers(std::chrono::steady_clock::now()) >= count; });

@@ -21,15 +21,15 @@
 namespace jostle::pool {
 
 struct RemotePoolOptions {
-  /// How long a batch tolerates that no worker can be used.
+  /// A batch fails when no worker can be used for so long.
   std::chrono::milliseconds no_worker_timeout{10'000};
   SchedulerOptions scheduler;
-  /// Hears of every sample that comes back, from the pool's own thread; must be quick
-  /// and use nothing of the pool's. Samples that are cancelled do not come back.
+  /// Called for every sample that comes back, from the pool's own thread; must be quick
+  /// and must not call the pool. Samples that are cancelled do not come back.
   std::function<void(const SampleTrace&)> on_sample;
 };
 
-/// Pool of worker processes in one DDS domain. Simulates nothing itself; the
+/// A RemotePool uses worker processes in one DDS domain. It simulates nothing itself; the
 /// README of this room describes the exchange.
 ///
 /// Threads  safe from any thread. One thread of its own sends everything.
@@ -41,7 +41,7 @@ struct RemotePoolOptions {
 class RemotePool final : public physics_pool::AsyncPool {
  public:
   RemotePool(const wire::Participant& participant, const RemotePoolOptions& options = {});
-  /// After every `run` has returned and every ticket is gone.
+  /// To be called after every `run` has returned and every ticket is gone.
   ~RemotePool() override;
 
   Result<Hash> load(const physics_pool::Scene& scene) override;
@@ -88,10 +88,10 @@ class RemotePool final : public physics_pool::AsyncPool {
 
   mutable std::mutex mutex_;                     // guards everything down to kicked_
   mutable std::condition_variable_any changed_;  // workers came or went
-  std::condition_variable_any wake_;             // of the dispatcher
+  std::condition_variable_any wake_;             // wakes the dispatcher
   Scheduler scheduler_;
   Epoch last_epoch_;
-  std::unordered_map<Hash, std::pair<StateLayout, double>> worlds_;  // and their time steps, s
+  std::unordered_map<Hash, std::pair<StateLayout, double>> worlds_;  // layouts and time steps, s
   std::map<Epoch, std::shared_ptr<Active>> active_;                  // shared with its ticket
   std::vector<Received> results_;
   std::vector<jostle_msgs::msg::WorkerHeartbeat> heartbeats_;
@@ -104,7 +104,7 @@ class RemotePool final : public physics_pool::AsyncPool {
 
   wire::Writer<jostle_msgs::msg::WorldDescription> world_writer_;
   wire::Writer<Control> control_writer_;
-  std::map<WorkerId, wire::Writer<AssignmentMessage>> assignment_writers_;  // of the dispatcher alone
+  std::map<WorkerId, wire::Writer<AssignmentMessage>> assignment_writers_;  // used by the dispatcher alone
   // Readers and the dispatcher use all of the above: last made, first gone.
   wire::Reader<jostle_msgs::msg::AssignmentResult> result_reader_;
   wire::Reader<jostle_msgs::msg::WorkerHeartbeat> heartbeat_reader_;

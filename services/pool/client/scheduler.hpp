@@ -32,19 +32,19 @@ struct WorkerNews {
   std::string name;
   int capacity = 1;           ///< rollouts at a time; 0: it takes its leave
   bool ready = false;         ///< it hears us, and we hear it
-  std::uint32_t samples = 0;  ///< of ours, queued or running there
-  std::uint64_t others = 0;   ///< of other clients' there
+  std::uint32_t samples = 0;  ///< our samples that are queued or running there
+  std::uint64_t others = 0;   ///< other clients' samples there
 };
 
 struct SchedulerOptions {
   /// A worker silent for so long is dead: five missed heartbeats.
   std::chrono::milliseconds silence{500};
-  /// Samples a worker has not, this long after they were sent, are lost.
+  /// A sample that its worker does not have, this long after it was sent, is lost.
   std::chrono::milliseconds lost_after{300};
-  /// Near the end of a batch, a sample that has waited behind another for so long is
-  /// given to an idle worker as well; one that runs, once it has also taken twice as
-  /// long as samples lately did. Shorter copies what is about to return anyway, and a
-  /// copy is in the way of what comes next.
+  /// Near the end of a batch, an idle worker gets a copy of a sample that has waited behind
+  /// another for so long. It gets a copy of a running sample only if that has also taken twice
+  /// as long as samples lately did. A shorter time copies samples that are about to return
+  /// anyway, and copies are in the way of what comes next.
   std::chrono::milliseconds copy_after{20};
   /// A worker that could not do its work gets none for so long.
   std::chrono::seconds bench{5};
@@ -52,15 +52,16 @@ struct SchedulerOptions {
   std::chrono::seconds remember{60};
 };
 
-/// Rules
+/// A Scheduler hands samples to workers by these rules:
+///
 ///   lowest sample first; batches of equal priority take turns, urgent ones go
-///   first, and every eighth sample is a normal one's while there are both
+///   first, and while there are both every eighth sample is of a normal batch
 ///   a worker holds at most capacity + 1 samples: one more than it can run, so
 ///   that no thread waits for the network between two of them
-///   where others use the worker too, and samples are shorter than messages may
-///   take, it holds as many as last that long: who has nothing there when a thread
-///   is free loses the turn
-///   samples of the dead go back to the queue
+///   where other clients use the worker too, and samples are shorter than messages may
+///   take, it holds as many as last that long: a client without a sample there when a
+///   thread becomes free loses its turn
+///   samples of dead workers go back to the queue
 ///   when the queue is empty, idle workers get a second copy of samples that
 ///   wait behind others first, then of those outstanding longest; a worker that
 ///   has enough to do for other clients is not idle
@@ -70,25 +71,25 @@ class Scheduler {
  public:
   explicit Scheduler(const SchedulerOptions& options) : options_(options) {}
 
-  /// Workers.
+  /// Takes in a worker's heartbeat.
   void heard(const WorkerNews& news, TimePoint now);
   void bench(WorkerId worker, TimePoint now);
   /// Declares silent workers dead; returns those forgotten for good.
   std::vector<WorkerId> check_silence(TimePoint now);
   int usable_workers(TimePoint now) const;
 
-  /// Batches.
+  /// Takes in a batch of `samples` samples, numbered from `first_sample` on.
   void start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples,
              physics_pool::Priority priority = physics_pool::Priority::kNormal);
-  /// Forgets a batch; true when workers still hold samples of it.
+  /// Forgets a batch. True if workers still hold samples of it.
   bool finish(Epoch epoch);
   std::uint32_t missing(Epoch epoch) const;
 
-  /// A sample came back. True when it is the first result of that sample;
-  /// otherwise it is late or a duplicate, and counted. `ran`: for how long, if known.
+  /// Takes in a sample that came back. True if it is the first result of that sample;
+  /// otherwise it is late or a duplicate, and counted. `ran`: how long it ran, if known.
   bool accept(WorkerId worker, Epoch epoch, std::uint32_t sample, std::uint64_t engine_steps, TimePoint now,
               std::chrono::duration<double> ran = {});
-  /// Samples above this one are no longer wanted.
+  /// Drops the samples above this one: they are no longer wanted.
   void drop_above(Epoch epoch, std::uint32_t sample);
 
   /// Hands out whatever may be handed out now.
@@ -157,7 +158,7 @@ class Scheduler {
   Epoch last_served_ = 0;
   std::uint64_t urgent_in_a_row_ = 0;               // samples handed out
   std::chrono::duration<double> typical_{0.0};      // from handing out to coming back, lately
-  std::chrono::duration<double> typical_run_{0.0};  // of a sample, lately; 0: not known
+  std::chrono::duration<double> typical_run_{0.0};  // how long samples lately ran; 0: not known
   std::uint64_t reissued_ = 0;
   std::uint64_t duplicates_ = 0;
 };

@@ -15,20 +15,20 @@ struct SampleTrace {
   std::uint64_t client = 0, worker = 0, epoch = 0;
   std::string worker_name;
   std::uint32_t thread = 0, sample = 0, attempt = 0;
-  bool first = true;                                    ///< false: its result came late or twice and was dropped
+  bool first = true;                                    ///< false: its result came late, or again, and was dropped
   double sent = 0.0, received = 0.0;                    ///< assignment and result, client's clock
   double arrived = 0.0, started = 0.0, finished = 0.0;  ///< assignment and sample, worker's clock
 };
 
-/// How far a worker's clock W is ahead of the client's C, from messages both ways.
+/// Estimates how far a worker's clock W is ahead of the client's C, from messages both ways.
 /// With delays d >= 0,
 ///
 ///   there   arrived_W - sent_C      = theta + d    so theta <= the least of these
 ///   back    received_C - finished_W = d - theta    so theta >= minus the least of these
 ///
 /// and theta is taken halfway: the error is at most half of the two least delays, a
-/// fraction of a millisecond. Clocks that drift apart widen it: on one machine there
-/// is one clock, and a minute costs two machines about a millisecond.
+/// fraction of a millisecond. Clocks that drift apart widen it: those of two machines by
+/// about a millisecond per minute. On one machine there is only one clock.
 ///
 /// Source   Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989.
 class ClockOffset {
@@ -64,13 +64,13 @@ struct Timeline {
   std::vector<Row> rows;     ///< by worker, then thread
   std::vector<Bar> bars;     ///< by row, then time
   double length = 0.0;       ///< s from the first assignment sent to the last result received
-  double efficiency = 0.0;   ///< busy of available time, all rows
+  double efficiency = 0.0;   ///< busy time as part of the available time, all rows
   double clock_error = 0.0;  ///< s, of the worker whose clock is known worst
   double on_the_way = 0.0;   ///< s, median per sample: from sent to received, less the time at the worker
   double in_line = 0.0;      ///< s, median per sample: at the worker before it ran
 };
 
-/// `workers`: those that there were; their idle threads get rows too. Workers are
+/// Makes the timeline of samples. `workers`: all that there were; their idle threads get rows too. Workers are
 /// told apart by name.
 Timeline timeline_of(const std::vector<SampleTrace>& traces,
                      const std::vector<physics_pool::WorkerStatus>& workers = {});

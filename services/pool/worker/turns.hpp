@@ -19,7 +19,7 @@ struct Job {
   std::uint64_t epoch = 0;  ///< batch, within the client
   std::uint32_t sample = 0;
   physics_pool::Priority priority = physics_pool::Priority::kNormal;
-  std::chrono::duration<double> charged{0.0};  ///< by next(): what it is expected to take
+  std::chrono::duration<double> charged{0.0};  ///< set by next(): how long it is expected to take
 };
 
 /// Shares the threads by work time, not by samples, in two layers: between
@@ -44,8 +44,8 @@ class Turns {
   /// Takes out the sample that runs next, if any waits.
   std::optional<Job> next();
 
-  /// A sample that next() gave out has run for so long. One that was skipped, at once
-  /// or on its way, says nothing of those to come.
+  /// Notes how long a sample that next() gave out has run. One that was skipped, at once
+  /// or on its way, says nothing about those to come.
   void done(const Job& job, Duration took, bool skipped = false);
 
   /// Takes out the waiting samples of a batch.
@@ -61,7 +61,7 @@ class Turns {
     std::optional<Duration> typical;  // e_i; none before the first has run
     std::deque<Job> jobs;
   };
-  /// Of one priority.
+  /// The clients of one priority.
   struct Class {
     Account account;
     double virtual_time = 0.0;  // V, among its clients

@@ -225,7 +225,7 @@ void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, 
   feed();
 }
 
-// Of a sample that waits or runs no more.
+// Takes out a sample that no longer waits or runs.
 WorkerService::Held WorkerService::release(const BatchId& batch, std::uint32_t sample) {
   const auto running = running_.find(batch);
   const auto found = running->second.samples.find(sample);

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "idl/types/time.hpp"
 #include "physics_pool/local/executor.hpp"
 #include "services/pool/worker/turns.hpp"
 #include "services/pool/worker/world_store.hpp"
@@ -23,16 +24,16 @@ namespace jostle::pool {
 struct WorkerOptions {
   std::string name;        ///< as clients report it; empty: host and process id
   int threads = 1;         ///< rollouts at a time; one per core is enough
-  std::vector<int> cores;  ///< of each simulating thread; empty: wherever the system likes
-  /// Bytes of worlds and simulators that are kept for the next batch: a quarter of them worlds. A client that plans
-  /// in many worlds at once needs room for all of them in every thread.
+  std::vector<int> cores;  ///< one for each simulating thread; empty: the system chooses
+  /// Bytes for worlds and simulators that are kept for the next batch, a quarter of them for worlds. A client that
+  /// plans in many worlds at once needs room for all of them in every thread.
   std::size_t memory = kMemory;
 
   static constexpr std::size_t kMemory = std::size_t{512} << 20;
 };
 
 /// Takes assignments, runs their samples, answers each. Clients and priorities share the
-/// threads by turns.hpp; whose sample runs is decided when a thread is free, not before.
+/// threads as turns.hpp says; whose sample runs is decided when a thread is free, not before.
 ///
 /// Threads  `threads` that simulate; one that checks assignments, compiles worlds and
 ///          deals samples out; one for heartbeats, so that a worker deep in
@@ -40,13 +41,13 @@ struct WorkerOptions {
 /// Failure  a bad assignment is answered with an error that names the field; an assignment
 ///          whose world does not arrive in 5 s likewise. A client that is gone
 ///          has its samples dropped. A result that the middleware does not take is lost
-///          and counted; its client sends the sample again, or to another worker. So it is
-///          with assignments beyond 1024 that were not looked at or wait for their worlds;
-///          the heartbeat says how many.
+///          and counted; its client sends the sample again, or to another worker. Assignments
+///          are lost and counted, too, once 1024 others were not looked at or wait for their
+///          worlds; the heartbeat says how many.
 class WorkerService {
  public:
   WorkerService(const wire::Participant& participant, const WorkerOptions& options);
-  /// Cancels what runs and takes leave of the clients; milliseconds.
+  /// Cancels what runs and takes leave of the clients; takes milliseconds.
   ~WorkerService();
 
   std::uint64_t id() const { return id_; }
@@ -54,7 +55,6 @@ class WorkerService {
 
  private:
   using Assignment = jostle_msgs::msg::Assignment;
-  using TimePoint = std::chrono::steady_clock::time_point;
 
   /// Names a batch: client and epoch.
   using BatchId = std::pair<std::uint64_t, std::uint64_t>;
@@ -97,7 +97,7 @@ class WorkerService {
   WorldStore worlds_;
 
   mutable std::mutex mutex_;          // guards everything down to kicked_
-  std::condition_variable_any wake_;  // of the serving thread
+  std::condition_variable_any wake_;  // wakes the serving thread
   std::deque<Arrival> arrivals_;
   Turns turns_;
   std::map<BatchId, Running> running_;
@@ -107,10 +107,10 @@ class WorkerService {
   std::uint64_t rollouts_ = 0;
   std::uint64_t engine_steps_ = 0;
   std::uint64_t refused_ = 0;       // assignments that came when too many were unread
-  std::uint64_t lost_results_ = 0;  // that the middleware did not take
+  std::uint64_t lost_results_ = 0;  // results that the middleware did not take
   bool kicked_ = false;
 
-  // Of the heart alone.
+  // Only the heart uses these.
   std::uint64_t said_lost_results_ = 0, said_refused_ = 0;
   TimePoint next_complaint_;
 

@@ -15,18 +15,20 @@
 
 namespace jostle::pool {
 
+/// Keeps worlds as text, and compiles a world when it is first asked for.
+///
 /// Threads  safe from any thread; find() compiles outside the lock, so announce()
 ///          never waits for it.
 class WorldStore {
  public:
-  /// `bytes`: of compiled worlds that are kept; the newest always is.
+  /// `bytes`: room for compiled worlds that are kept; the newest one always is.
   explicit WorldStore(std::size_t bytes) : bytes_(bytes) {}
 
   /// Keeps a text under the name its sender gave it. Cheap. A text with another
   /// hash is refused, unless the right one is already here.
   void announce(const Hash& hash, std::string scene);
 
-  /// The compiled world; nothing while its text has not arrived.
+  /// Returns the compiled world; nothing while its text has not arrived.
   /// Errors   kInvalidArgument  the text has another hash, is no scene, or the
   ///          engine refuses it; the message names the hash.
   std::optional<Result<physics_pool::WorldPtr>> find(const Hash& hash);

@@ -15,65 +15,65 @@ namespace jostle::studies {
 /// How to measure, as the command line says it.
 struct Settings {
   int repeats = 0;           ///< >= 1
-  std::vector<int> workers;  ///< of `scheduling`: processes, one measurement each
-  int domain = 0;            ///< DDS domain that nobody else uses, nor the next one
+  std::vector<int> workers;  ///< for `scheduling`: numbers of processes, one measurement each
+  int domain = 0;            ///< DDS domain; nobody else uses it, or the next one
   std::stop_token stop;
-  std::function<void(const std::string& line)> on_news;  ///< while it takes long; never empty
+  std::function<void(const std::string& line)> on_news;  ///< called while it takes long; never empty
 };
 
 using Measurements = std::vector<Measurement>;
 
-/// Longest one run of one side may take: a pool that is slower hangs.
+/// The longest that one run of one side may take: a pool that is slower hangs.
 inline constexpr std::chrono::minutes kPatience{5};
 
-/// ThreadPool against as many bare loops of engine steps, steps/s.
+/// Measures ThreadPool against as many bare loops of engine steps, steps/s.
 Result<Measurements> measure_pool_threads(const Settings& settings);
 
-/// RemotePool with two worker processes against two bare loops, steps/s.
+/// Measures RemotePool with two worker processes against two bare loops, steps/s.
 Result<Measurements> measure_pool_dds(const Settings& settings);
 
-/// A batch of one empty sample through RemotePool and one worker against an
+/// Measures a batch of one empty sample through RemotePool and one worker against an
 /// echo over bare Fast DDS, microseconds.
 Result<Measurements> measure_round_trip(const Settings& settings);
 
-/// A batch with stop_losers against the same batch without, rollouts/s.
+/// Measures a batch with stop_losers against the same batch without, rollouts/s.
 Result<Measurements> measure_early_stop(const Settings& settings);
 
-/// Worker processes that wait instead of simulating: the time their waiting
+/// Measures worker processes that wait instead of simulating: the time their waiting
 /// takes when nobody idles, against the time the batch took.
 Result<Measurements> measure_scheduling(const Settings& settings);
 
-/// The same with the workers spread over hosts.
+/// Measures the same with the workers spread over hosts.
 Result<Measurements> measure_hosts_scheduling(const Settings& settings);
 
-/// Round trips and throughput between two hosts over a good and a bad link, through a
+/// Measures round trips and throughput between two hosts over a good and a bad link, through a
 /// protected and an unprotected domain, microseconds and MB/s.
 Result<Measurements> measure_hosts(const Settings& settings);
 
-/// Batches like a plan's, their samples waiting instead of simulating, while one of two hosts
+/// Measures batches like a plan's, whose samples wait instead of simulating, while one of two hosts
 /// of workers is unplugged for a while, against the same left alone, seconds.
 Result<Measurements> measure_unplugged(const Settings& settings);
 
-/// One step of 1 s of every coarse model against one of the fine model, microseconds.
-/// The sides answer the same question, not alike.
+/// Measures one step of 1 s of every coarse model against one of the fine model, microseconds.
+/// The sides answer the same question, and give different answers.
 Result<Measurements> measure_coarse_models(const Settings& settings);
 
-/// One trajectory by Parareal on all processors against the serial fine model's time
-/// divided by what Eq. 6.4 allows for so many.
+/// Measures one trajectory by Parareal on all processors against the serial fine model's time
+/// divided by the speed-up that Eq. 6.4 allows for so many.
 Result<Measurements> measure_parareal(const Settings& settings);
 
-/// The same over N worker processes that wait as long as a slice takes: what the
+/// Measures the same over N worker processes that wait as long as a slice takes: what the
 /// exchange of slices costs, beyond Eq. 6.4, where there are processors enough.
 Result<Measurements> measure_parareal_scheduling(const Settings& settings);
 
-/// Messages of 1 KiB into a bag of each kind against bare appends of the same bytes, messages/s.
+/// Measures writing messages of 1 KiB into a bag of each kind against bare appends of the same bytes, messages/s.
 Result<Measurements> measure_bag(const Settings& settings);
 
-/// A bag of 1000 messages per second, played at rates from 0.1 to 10 by another process: the
+/// Measures a bag of 1000 messages per second, played at rates from 0.1 to 10 by another process: the
 /// time it takes as heard here against the time it has in the bag, ms.
 Result<Measurements> measure_play(const Settings& settings);
 
-/// The other process of `round-trip`: answers every assignment until it is told to
+/// Is the other process of `round-trip`: answers every assignment until it is told to
 /// end. Returns the exit code.
 int serve_echo(int domain, std::stop_token stop);
 

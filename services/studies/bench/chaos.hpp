@@ -13,7 +13,7 @@
 namespace jostle::studies {
 
 struct ChaosOptions {
-  std::uint64_t seed = 1;  ///< of the schedule, see chaos_schedule()
+  std::uint64_t seed = 1;  ///< the schedule's, see chaos_schedule()
   int faults = 200;        ///< >= 1; three or so a second
   int workers = 4;         ///< processes of one thread, dealt to two hosts
   int domain = 0;

@@ -24,16 +24,16 @@ struct Fault {
   bool operator==(const Fault&) const = default;
 };
 
-/// "kill", "stall" or "unplug".
+/// Returns "kill", "stall" or "unplug".
 std::string to_string(Fault::Kind kind);
 
-/// So many faults, earliest first, a function of its arguments alone. Kinds and targets are
+/// Draws so many faults, earliest first, a function of its arguments alone. Kinds and targets are
 /// drawn evenly; 0.1 to 0.7 s lie between two faults. Stalls and unpluggings last 0.1 to
 /// 3 s, which is shorter and longer than silence makes a worker dead (0.5 s) and than the
 /// middleware forgets a process (2 s); a killed worker is replaced after 0.05 to 0.5 s.
 /// Nobody is hit again before it was made good, so that every fault counts.
 ///
-/// `hosts`: of workers; 0: nothing is unplugged.
+/// `hosts`: number of hosts of workers; 0: nothing is unplugged.
 std::vector<Fault> chaos_schedule(std::uint64_t seed, int faults, int workers, int hosts);
 
 }  // namespace jostle::studies

@@ -41,13 +41,18 @@ struct Task {
   Hash hash;
   std::uint64_t seed = 0;
 
-  planners::Problem problem(const planners::ControlOptions& control, int iterations) const {
+  // As a controller's first one: what lodges in the hand does not count yet.
+  planners::Problem problem(const CheapPhysicsOptions& study, int iterations) const {
     const State x0 = physics_pool::initial_state(scene);
-    return {.world = hash,
-            .x0 = x0,
-            .initial = planners::straight_line(world->geometry(), x0, control.initial_steps, control.step_duration),
-            .iterations = iterations,
-            .seed = seed};
+    planners::Problem problem{.world = hash,
+                              .x0 = x0,
+                              .initial = planners::straight_line(world->geometry(), x0, study.control.initial_steps,
+                                                                 study.control.step_duration),
+                              .iterations = iterations,
+                              .seed = seed,
+                              .objective = study.objective};
+    problem.objective["obstruction"].weight = 0.0;
+    return problem;
   }
 };
 
@@ -87,8 +92,9 @@ Result<double> speed(Pool& pool, const Task& task, PbstoOptions options, const C
                      std::stop_token stop) {
   options.min_steps = physics_pool::kMaxSteps;
   options.stop_losers = false;
-  options.objective.success_cost = 0.0;
-  auto timed_result = timed_plan(pool, options, task.problem(study.control, study.iterations), stop);
+  planners::Problem problem = task.problem(study, study.iterations);
+  problem.objective.success_cost = 0.0;
+  auto timed_result = timed_plan(pool, options, problem, stop);
   if (!timed_result) return timed_result.error();
   const int candidates = timed_result->plan.iterations * options.rollouts * options.screening;
   return candidates / timed_result->seconds;
@@ -104,7 +110,7 @@ Fidelity last_choice(const PbstoOptions& options) { return {.freeze = options.fr
 Result<std::vector<RolloutOutcome>> samples(Pool& pool, const Task& task, const CheapPhysicsOptions& study,
                                             const Fidelity& fidelity, std::stop_token stop) {
   const PbstoOptions& options = study.levers.front().options;
-  const planners::Problem problem = task.problem(study.control, 0);
+  const planners::Problem problem = task.problem(study, 0);
   RolloutBatch batch{
       .world = task.hash,
       .x0 = problem.x0,
@@ -113,7 +119,7 @@ Result<std::vector<RolloutOutcome>> samples(Pool& pool, const Task& task, const 
       .step_duration = options.step_duration,
       .law = {.sigma = options.sigma, .limit = options.limit, .scales = options.scales, .seed = task.seed},
       .samples = study.samples,
-      .objective = options.objective,
+      .objective = study.objective,
       .stop_losers = false,
       .want_all_trajectories = true,
       .fidelity = fidelity};
@@ -152,9 +158,9 @@ double correlation(const std::vector<RolloutOutcome>& a, const std::vector<Rollo
 
 // Whether the plan, executed without looking, brings the full world's target into
 // the hand and drops nothing.
-bool succeeds(const Task& task, const Plan& plan, const planners::PbstoOptions& options) {
+bool succeeds(const Task& task, const Plan& plan, const CheapPhysicsOptions& study) {
   physics_pool::ExecutionWorld world(task.world);
-  const long steps = std::lround(options.step_duration / task.world->time_step());
+  const long steps = std::lround(study.control.step_duration / task.world->time_step());
   for (int t = 0; t < plan.controls.steps(); ++t) {
     world.begin(plan.controls.step(t));
     for (long i = 0; i < steps; ++i) {
@@ -162,8 +168,8 @@ bool succeeds(const Task& task, const Plan& plan, const planners::PbstoOptions& 
     }
   }
   const physics_pool::TaskGeometry& geometry = task.world->geometry();
-  return physics_pool::at_goal(geometry, world.state(), options.objective) &&
-         physics_pool::count_dropped(geometry, world.state(), options.objective.value("drop", "height")) == 0;
+  return physics_pool::at_goal(geometry, world.state(), study.objective) &&
+         physics_pool::count_dropped(geometry, world.state(), study.objective.value("drop", "height")) == 0;
 }
 
 // Results by lever and size, made when first asked for.
@@ -260,12 +266,12 @@ class Study {
     std::string line;
     for (std::size_t i = 0; i < options_.levers.size(); ++i) {
       const PbstoOptions& lever = options_.levers[i].options;
-      auto timed_result = timed_plan(pool_, lever, task.problem(options_.control, most), stop_);
+      auto timed_result = timed_plan(pool_, lever, task.problem(options_, most), stop_);
       if (!timed_result) return timed_result.error();
       const Plan& plan = timed_result->plan;
       if (!first) first = *timed_result;
       LeverResult& result = results_.of(i, objects);
-      const bool executed = plan.at_goal && succeeds(task, plan, lever);
+      const bool executed = plan.at_goal && succeeds(task, plan, options_);
       ++result.worlds;
       result.planned += plan.at_goal ? 1 : 0;
       result.executed += executed ? 1 : 0;
@@ -287,8 +293,8 @@ class Study {
       auto task_result = task_of(pool_, scene, static_cast<std::uint64_t>(seed));
       if (!task_result) return task_result.error();
       for (const Lever& lever : options_.levers) {
-        auto timed_result = timed_plan(pool_, lever.options,
-                                       task_result->problem(options_.control, options_.control.many_iterations), stop_);
+        auto timed_result =
+            timed_plan(pool_, lever.options, task_result->problem(options_, options_.control.many_iterations), stop_);
         if (!timed_result) return timed_result.error();
         demo_.push_back({.lever = lever.name,
                          .seed = task_result->seed,
@@ -329,7 +335,7 @@ nlohmann::json number_or_null(const std::optional<double>& value) {
   return value ? nlohmann::json(*value) : nlohmann::json();
 }
 
-// Of one lever, by seed; a search that found nothing counts with its time.
+// Seconds that a lever took, by seed; a search that found nothing counts with its time.
 std::vector<double> demo_seconds(const CheapPhysics& results, const std::string& lever) {
   std::vector<double> seconds;
   for (const DemoPlan& plan : results.demo) {
@@ -448,7 +454,7 @@ Result<std::vector<Curve>> compare_peers(Pool& pool, const PbstoOptions& shipped
                                        .steps = options.control.initial_steps,
                                        .step_duration = shipped.step_duration,
                                        .fidelity = last_choice(shipped),
-                                       .objective = shipped.objective};
+                                       .objective = options.objective};
   const auto tell = [&](const Curve& curve, std::size_t done, std::size_t total) {
     if (options.on_news) options.on_news(fmt::format("peers {}/{}: {} in {}", done, total, curve.method, curve.world));
   };
@@ -466,15 +472,14 @@ Result<void> bench_cheap_physics(CheapPhysicsOptions options, const CheapPhysics
   const PbstoOptions& shipped = parameters_result->planner;
   options.levers = usual_levers(shipped);
   options.control = parameters_result->controller.control;
+  options.objective = parameters_result->objective;
   options.demo = {*demo_result};
   physics_pool::ThreadPool pool(static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u)));
   auto results = measure_cheap_physics(pool, options, stop);
   if (!results) return results.error();
   fmt::print("{}", to_text(*results));
   nlohmann::json json = to_json(*results);
-  const auto save = [&] {
-    return files.json.empty() ? Result<void>{} : common::write_results(files.json, json);
-  };
+  const auto save = [&] { return files.json.empty() ? Result<void>{} : common::write_results(files.json, json); };
   if (auto ok = save(); !ok) return ok;  // before the peers: half of an hour is worth keeping
   if (std::ranges::find(options.parts, "peers") == options.parts.end()) return {};
   auto curves_result = compare_peers(pool, shipped, options, stop);

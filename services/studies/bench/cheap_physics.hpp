@@ -18,32 +18,33 @@
 
 namespace jostle::studies {
 
-/// A way to plan. The first of a list is what the others are compared with.
+/// A lever is a way to plan. The first of a list is what the others are compared with.
 struct Lever {
   std::string name;
   planners::PbstoOptions options;
 };
 
-/// plain (Sec. 3.3.1: 8 rollouts, full physics); freeze, screening and hopeless alone,
-/// each as `shipped` has it; all: `shipped` itself.
+/// Returns plain (Sec. 3.3.1: 8 rollouts, full physics); freeze, screening and hopeless alone,
+/// each as `shipped` has it; and all: `shipped` itself.
 std::vector<Lever> usual_levers(const planners::PbstoOptions& shipped);
 
 struct CheapPhysicsOptions {
   std::vector<Lever> levers;
   /// What to measure: any of speed, truth, success, demo, peers.
   std::vector<std::string> parts{"speed", "truth", "success", "demo", "peers"};
+  physics_pool::Objective objective = physics_pool::Objective::standard();
   planners::ControlOptions control;       ///< initial_steps, many_iterations and step_duration
   std::vector<int> sizes{5, 10, 15, 40};  ///< objects beside the target
-  int worlds = 3;                         ///< of each size, seeds 1 to this
-  int repeats = 3;                        ///< of each world's speed measurement
-  int iterations = 2;                     ///< of a planner whose speed is measured
-  std::uint32_t samples = 16;             ///< per world, whose costs and poses are compared
-  int executed_objects = 15;              ///< of the worlds that are planned and executed
+  int worlds = 3;                         ///< worlds of each size, seeds 1 to this
+  int repeats = 3;                        ///< measurements of speed in each world
+  int iterations = 2;                     ///< iterations of a planner whose speed is measured
+  std::uint32_t samples = 16;             ///< samples per world whose costs and poses are compared
+  int executed_objects = 15;              ///< objects of the worlds that are planned and executed
   int executed_worlds = 20;               ///< seeds 1 to this
-  int large_iterations = 12;              ///< of plans in worlds of more objects, which take minutes
-  std::vector<physics_pool::Scene> demo;  ///< planned only, with each of demo_seeds
+  int large_iterations = 12;              ///< iterations of plans in worlds of more objects, which take minutes
+  std::vector<physics_pool::Scene> demo;  ///< scenes that are planned only, with each of demo_seeds
   int demo_seeds = 5;
-  std::uint64_t peer_rollouts = 150;                ///< of each peer in each world
+  std::uint64_t peer_rollouts = 150;                ///< budget of each peer in each world
   std::function<void(const std::string&)> on_news;  ///< a line now and then
 };
 
@@ -52,7 +53,7 @@ struct LeverResult {
   std::string name;
   int objects = 0;
   std::vector<double> ratios;        ///< candidates per second, losers not stopped; one per world and repeat
-  std::vector<double> correlations;  ///< per world: Spearman's, of what ranks candidates first with full physics
+  std::vector<double> correlations;  ///< per world: Spearman's, of costs in the first ranking and with full physics
   std::vector<double> pose_errors;   ///< m, last position of each object that full physics moved by 1 mm
   int planned = 0, executed = 0, worlds = 0;  ///< success predicted; success in the full world
   std::vector<double> time_ratios;            ///< seconds to success, first lever's / this one's, where both planned
@@ -81,7 +82,7 @@ struct CheapPhysics {
 Result<CheapPhysics> measure_cheap_physics(physics_pool::Pool& pool, const CheapPhysicsOptions& options,
                                            std::stop_token stop);
 
-/// Spearman's rank correlation, ties at their mean rank; NaN for fewer than two
+/// Returns Spearman's rank correlation, ties at their mean rank; NaN for fewer than two
 /// pairs or for constant values.
 double rank_correlation(const std::vector<double>& a, const std::vector<double>& b);
 

@@ -51,12 +51,11 @@ Contender pbsto(std::string name, PbstoOptions::Update update) {
             own.update = update;
             own.rollouts = options.batch;
             own.step_duration = options.step_duration;
-            own.objective = options.objective;
             return std::make_unique<planners::Pbsto>(pool, std::move(own), std::move(on_progress));
           }};
 }
 
-// Of one sigma, noise with the variance of PBSTO's several scales together.
+// The one sigma whose noise has the variance of PBSTO's several scales together.
 std::vector<double> equal_sigma(const PbstoOptions& pbsto) {
   double squares = 0.0;
   for (const double scale : pbsto.scales) squares += scale * scale;
@@ -71,8 +70,7 @@ Contender sampling(std::string name, SamplingOptions::Method method) {
             SamplingOptions own{.method = method,
                                 .rollouts = options.batch,
                                 .sigma = equal_sigma({}),
-                                .step_duration = options.step_duration,
-                                .objective = options.objective};
+                                .step_duration = options.step_duration};
             return std::make_unique<planners::SamplingPlanner>(pool, std::move(own), std::move(on_progress));
           }};
 }
@@ -80,7 +78,7 @@ Contender sampling(std::string name, SamplingOptions::Method method) {
 // One world, ready to be searched.
 struct Arena {
   const Scene& scene;
-  planners::Problem problem;  // but for the seed
+  planners::Problem problem;  // but for the seed and the objective
 
   static Result<Arena> make(Pool& pool, const Scene& scene, const ConvergenceOptions& options) {
     auto world_result = pool.load(scene);
@@ -107,6 +105,8 @@ Result<Curve> search(Pool& pool, const Arena& arena, const Contender& contender,
   });
   planners::Problem problem = arena.problem;
   problem.seed = seed;
+  problem.objective = options.objective;
+  problem.objective["obstruction"].weight = 0.0;  // as in a controller's first plan
   problem.iterations =
       static_cast<int>(std::min<std::uint64_t>(options.rollouts, 1'000'000));  // each costs one or more
   auto plan_result = planner->plan(problem, physics_pool::TimePoint::max(), enough.get_token());

@@ -28,7 +28,7 @@ struct Contender {
       make;
 };
 
-/// PBSTO greedy (the thesis's) and cost-weighted, predictive sampling, MPPI, CEM
+/// Returns PBSTO greedy (the thesis's) and cost-weighted, predictive sampling, MPPI, CEM
 /// and iCEM-like, in this order. All have their default options but for what
 /// ConvergenceOptions says and for the peers' one sigma: it gives their noise the
 /// variance that PBSTO's has over its scales.
@@ -37,23 +37,23 @@ std::vector<Contender> usual_contenders();
 struct ConvergenceOptions {
   std::vector<Contender> contenders = usual_contenders();
   std::uint64_t rollouts = 400;         ///< a search ends after the iteration that reaches it, >= 1
-  std::vector<std::uint64_t> seeds{1};  ///< of the noise; every world with each
-  /// Rollouts per iteration, of iCEM in the first one; CEM fits a deviation to a
+  std::vector<std::uint64_t> seeds{1};  ///< the noise's; every world is searched with each
+  /// Rollouts per iteration; for iCEM, in the first one. CEM fits a deviation to a
   /// quarter of them, which asks for more than the thesis's 8.
   int batch = 16;
   int steps = 6;                    ///< n of the straight line that all begin with, >= 1
   double step_duration = 1.0;       ///< Delta_t, s
-  physics_pool::Fidelity fidelity;  ///< of every rollout whose planner asks for no other
-  /// Its success_cost does not count: it becomes 0, which no rollout that moves
+  physics_pool::Fidelity fidelity;  ///< that of every rollout whose planner asks for no other
+  /// The objective's success_cost does not count: it becomes 0, which no rollout that moves
   /// the hand reaches, so that nobody ends early. A search that succeeds after
   /// ten rollouts would say nothing about the next three hundred.
-  physics_pool::Objective objective;
+  physics_pool::Objective objective = physics_pool::Objective::standard();
 };
 
 struct CurvePoint {
   std::uint64_t rollouts = 0;
   double seconds = 0.0;  ///< since the search began
-  double cost = 0.0;     ///< of the best sequence so far; +inf until one was scored
+  double cost = 0.0;     ///< that of the best sequence so far; +inf until one was scored
 };
 
 /// One search; its first point is the straight line's.
@@ -64,7 +64,7 @@ struct Curve {
   std::vector<CurvePoint> points;
 };
 
-/// After each curve, how many of how many are done.
+/// Called after each curve: `done` of `total` curves are done.
 using OnCurve = std::function<void(const Curve&, std::size_t done, std::size_t total)>;
 
 /// Lets all contenders search every scene with every seed, one after the other
@@ -78,25 +78,25 @@ Result<std::vector<Curve>> measure_convergence(physics_pool::Pool& pool, const s
 
 enum class Spent { kRollouts, kSeconds };
 
-/// Of one method, over worlds and seeds: cost as part of the straight line's.
+/// A Summary joins one method's curves over worlds and seeds. Costs are parts of the straight line's.
 struct Summary {
   std::string method;
   std::vector<double> x;                  ///< rollouts or s, evenly spaced on a logarithmic scale
   std::vector<double> low, median, high;  ///< quartiles at each x
 };
 
-/// Methods in the order of their first curves. A curve is a staircase: it has
+/// Summarizes methods, in the order of their first curves. A curve is a staircase: it has
 /// the cost of its last point at or before x, 1 before its first, and keeps its
 /// last cost once it has ended. Rollouts go up to the largest number spent,
 /// seconds up to the method's median. Curves whose straight line diverged have
 /// nothing to be compared with and are left out.
 std::vector<Summary> summarize(const std::vector<Curve>& curves, Spent spent, int points = 120);
 
-/// {"curves": [{method, world, seed, rollouts: [...], seconds: [...], cost: [...]}]};
+/// Writes {"curves": [{method, world, seed, rollouts: [...], seconds: [...], cost: [...]}]};
 /// an infinite cost is null.
 nlohmann::json to_json(const std::vector<Curve>& curves);
 
-/// Two panels, over rollouts and over seconds. Errors of plot().
+/// Draws two panels, over rollouts and over seconds. Errors are those of plot().
 Result<void> plot_convergence(const std::vector<Curve>& curves, const std::filesystem::path& png);
 
 }  // namespace jostle::studies

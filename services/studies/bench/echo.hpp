@@ -14,25 +14,25 @@
 
 namespace jostle::studies {
 
-/// A reliable message that takes longer does not come any more.
+/// A reliable message that takes longer than this does not come any more.
 inline constexpr std::chrono::seconds kLost{30};
 
-/// Times of single round trips, microseconds, and the runs they make up.
+/// Trips collects times of single round trips, microseconds, and makes runs of them.
 class Trips {
  public:
   void add(std::chrono::steady_clock::time_point start);
 
-  /// Median of those since the last run's end; `hash` of what they brought.
+  /// Ends a run: returns the median of the times since the last run's end. `hash`: that of what the trips brought.
   Sample finish(const Hash& hash);
 
   const std::vector<double>& all() const { return all_; }
 
  private:
   std::vector<double> all_;
-  std::size_t first_ = 0;  // of the present run
+  std::size_t first_ = 0;  // the present run's
 };
 
-/// This process's end; serve_echo() is the other's. Topics of the pool's type and promise
+/// This process's end of the echo; serve_echo() is the other process's. The topics have the pool's types and promises,
 /// under names of their own. An assignment that wants all trajectories gets its nominal controls
 /// back as one, so that as much returns as was sent; others get an empty outcome.
 class Echo {
@@ -42,14 +42,14 @@ class Echo {
 
   explicit Echo(const wire::Participant& participant);
 
-  /// Sends until an answer comes: only that shows that both directions work. Errors
+  /// Sends until an answer comes: only that shows that both directions work. Error
   /// kUnavailable, with the last words of a helper that ended.
   Result<void> meet(Assignment assignment, Helpers& helpers);
 
-  /// One round trip.
+  /// Makes one round trip.
   Result<Answer> ask(Assignment& assignment);
 
-  /// `count` of them, no more than `window` under way.
+  /// Makes `count` round trips, no more than `window` under way at a time.
   Result<void> stream(Assignment& assignment, int count, int window);
 
  private:
@@ -60,10 +60,10 @@ class Echo {
   std::uint64_t epoch_ = 0;  // of the newest question
 };
 
-/// The message that the pool sends for the first sample of such a batch.
+/// Returns the message that the pool sends for the first sample of a batch.
 jostle_msgs::msg::Assignment assignment_of(const physics_pool::RolloutBatch& batch);
 
-/// What a worker answers to an empty sample.
+/// Returns what a worker answers to an empty sample.
 physics_pool::RolloutOutcome empty_outcome(std::uint32_t sample);
 
 }  // namespace jostle::studies

@@ -3,6 +3,7 @@
 /// Two sides of one benchmark, run in turns, and what became of it.
 
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -18,7 +19,7 @@ namespace jostle::studies {
 /// One run of one side.
 struct Sample {
   double value = 0.0;  ///< in the measurement's unit, > 0
-  Hash hash;           ///< of what it computed
+  Hash hash;           ///< that of what it computed
 };
 
 /// What a side is called, and one run of it.
@@ -49,31 +50,31 @@ struct Measurement {
   std::vector<std::pair<std::string, double>> details;  ///< further numbers, by name
   double load = 0.0;  ///< one-minute load average before; more than 0.1 is somebody else's
 
-  /// Median of a[i]/b[i]: what slows the machine for a while slows both.
+  /// Returns the median of a[i]/b[i]: what slows the machine for a while slows both.
   double ratio() const;
   common::Interval interval() const;
 };
 
-/// CPU seconds that this process has used.
+/// Returns the CPU seconds that this process has used.
 double own_cpu_seconds();
 
 struct Turns {
   int repeats = 1;
   std::stop_token stop;
-  std::function<double()> cpu_seconds = own_cpu_seconds;  ///< used so far by all who take part
+  std::function<double()> cpu_seconds = own_cpu_seconds;  ///< CPU time used so far by all processes that take part
 };
 
 /// Runs a, b, a, b, …, each `repeats` times after one run that is not counted.
 /// Errors   a side's, or kCancelled between two runs.
 Result<Measurement> compare(const Side& a, const Side& b, const Turns& turns);
 
-/// For people who wait for the next one.
+/// Writes one line, for people who wait for the next measurement.
 std::string one_line(const Measurement& measurement);
 
-/// For people: a few lines.
+/// Writes a few lines for people.
 std::string to_text(const Measurement& measurement);
 
-/// For scripts: a list of objects with name, ratio, interval, samples, a, b,
+/// Writes a list for scripts: objects with name, ratio, interval, samples, a, b,
 /// unit, hash_a, hash_b, aim and more.
 nlohmann::json to_json(const std::vector<Measurement>& measurements);
 

@@ -11,13 +11,13 @@
 namespace jostle::studies {
 
 /// A search of Alg. 1 among five objects that is never content before its last
-/// iteration. The same plan each time, bit for bit, whatever becomes of the workers.
+/// iteration. It gives the same plan each time, bit for bit, whatever becomes of the workers.
 class PlanAgain {
  public:
   /// Loads the scene. Keeps a reference to the pool. Errors: those of Pool::load.
   static Result<PlanAgain> make(physics_pool::Pool& pool, int iterations);
 
-  /// Seconds, and the hash of controls, states and cost. Errors: those of Pool::run.
+  /// Plans once; returns the seconds, and the hash of controls, states and cost. Errors: those of Pool::run.
   Result<Sample> run(physics_pool::TimePoint deadline, std::stop_token stop) const;
 
  private:

@@ -35,7 +35,7 @@ class Recorder {
     const std::lock_guard lock(mutex_);
     traces_.push_back(trace);
   }
-  // Of samples sent from then on: a copy may come back after its batch is over.
+  // The traces of samples sent from `then` on: a copy may come back after its batch is over.
   std::vector<pool::SampleTrace> since(std::chrono::steady_clock::time_point then) const {
     const std::lock_guard lock(mutex_);
     std::vector<pool::SampleTrace> traces = traces_;

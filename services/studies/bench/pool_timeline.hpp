@@ -15,8 +15,8 @@ struct PoolTimelineOptions {
   int workers = 1;         ///< processes of one thread each
   std::vector<int> cores;  ///< dealt to the workers in turn; empty: not pinned
   int clients = 1;         ///< with the same work, in longer and shorter samples
-  bool urgent = false;     ///< the last client's batches are
-  int batches = 3;         ///< of each client, one after the other
+  bool urgent = false;     ///< whether the last client's batches are urgent
+  int batches = 3;         ///< batches of each client, one after the other
   int domain = 0;
   std::filesystem::path picture;  ///< PNG or SVG; empty: none
   std::filesystem::path json;     ///< empty: none

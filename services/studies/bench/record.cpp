@@ -262,7 +262,7 @@ void print(const json& all) {
   }
 }
 
-// Of all processes that were started and have ended, theirs included.
+// CPU time of all processes that were started and have ended, and of those that they started.
 double children_cpu_seconds() {
   rusage used{};
   getrusage(RUSAGE_CHILDREN, &used);

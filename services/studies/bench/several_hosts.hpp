@@ -10,10 +10,10 @@
 
 namespace jostle::studies {
 
-/// A long or a bad way: 10 ms there and back, one frame in a hundred lost each way.
+/// A link that is long and bad: 10 ms there and back, one frame in a hundred lost each way.
 inline constexpr common::LinkQuality kBadLink{.delay = std::chrono::milliseconds(5), .loss = 0.01, .seed = 1};
 
-/// Measures on host 1 of so many, whose clients, participants and threads then are there.
+/// Runs `measure` on host 1 of so many: all clients, participants and threads that it makes are there.
 /// Errors   the measurement's; kUnavailable without the right to make hosts
 Result<Measurements> measure_on_hosts(int count, const common::LinkQuality& quality,
                                       const std::function<Result<Measurements>(const common::Hosts&)>& measure);

@@ -38,15 +38,15 @@ class Helpers {
   /// Errors   kNotFound naming the program, kIo naming the folder.
   Result<void> start(const std::string& program, std::vector<std::string> arguments, const Place& place = {});
 
-  /// Another one of the same in the place of one that was killed.
+  /// Starts the same program again, in the place of a helper that was killed.
   Result<void> replace(std::size_t helper);
 
   pid_t pid(std::size_t helper) const { return helpers_.at(helper).process.pid(); }
 
-  /// One that is gone, with its last words; empty while all are there.
+  /// Names a helper that is gone, with its last words; empty while all are there.
   std::string casualty();
 
-  /// CPU time that this process and the helpers have used.
+  /// Returns the CPU time that this process and the helpers have used.
   double cpu_seconds() const;
 
  private:
@@ -67,8 +67,7 @@ class Helpers {
   std::vector<Helper> helpers_;
 };
 
-/// The calling thread, and the threads and processes it starts, run on one core
-/// until the end of the scope.
+/// While a Pinned lives, the calling thread, and the threads and processes it starts, run on one core.
 class Pinned {
  public:
   explicit Pinned(int core);
@@ -84,14 +83,14 @@ struct SwarmOptions {
   int workers = 1;
   int domain = 0;
   std::optional<int> core;  ///< the only one the workers run on, if given
-  std::vector<int> cores;   ///< else: dealt to the workers in turn, each pinned to its own; empty: not pinned
+  std::vector<int> cores;   ///< without `core`: dealt to the workers in turn, each pinned to its own; empty: not pinned
   const common::Hosts* hosts = nullptr;  ///< workers live on hosts 2, 3, … in turn; null: on this one
-  std::filesystem::path keystore;  ///< of a protected domain: we are its `robot`, they its `worker`; else JOSTLE_SECURE
+  std::filesystem::path keystore;  ///< a protected domain's: we are its `robot`, they its `worker`; else JOSTLE_SECURE
   pool::RemotePoolOptions pool;
   std::stop_token stop;
 };
 
-/// Workers of one thread each and a client in the same domain.
+/// A Swarm is workers of one thread each, and a client in the same domain.
 class Swarm {
  public:
   /// Returns when all workers can be used.

@@ -12,28 +12,28 @@
 
 namespace jostle::studies {
 
-/// A generated scene of Sec. 3.3.1 with this many objects beside the target.
+/// Generates a scene of Sec. 3.3.1 with this many objects beside the target.
 Result<physics_pool::Scene> clutter(int objects);
 
-/// A straight push of `steps` control steps into the scene, and noisy samples
+/// Makes a straight push of `steps` control steps into the scene, and noisy samples
 /// of it that all run to their ends.
 physics_pool::RolloutBatch push(const physics_pool::Scene& scene, int steps, double step_duration,
                                 std::uint32_t samples);
 
-/// Of states, in order, bit for bit.
+/// Hashes states, in order, bit for bit.
 Hash hash_of_states(const std::vector<State>& states);
 
-/// Of every outcome's last state, in sample order; a rollout without one (it
+/// Hashes every outcome's last state, in sample order; a rollout without one (it
 /// diverged) leaves a gap that no bare loop has.
 Hash hash_of_last_states(const physics_pool::BatchReply& reply);
 
-/// Of every outcome's sample, end and cost.
+/// Hashes every outcome's sample, end and cost.
 Hash hash_of_answers(const std::vector<physics_pool::RolloutOutcome>& outcomes);
 
-/// One batch through a pool, in engine steps per second.
+/// Times one batch through a pool, in engine steps per second.
 Result<Sample> time_steps(physics_pool::Pool& pool, const physics_pool::RolloutBatch& batch, std::stop_token stop);
 
-/// The yardstick: threads that do nothing but make a sample's controls, inject
+/// BareLoops are the yardstick: threads that do nothing but make a sample's controls, inject
 /// its first state and step the engine. They take the next sample from a counter,
 /// as a pool's threads take theirs from a queue, so that a long rollout costs
 /// both sides the same. `Simulator::begin` and `step` are mj_step and the few
@@ -42,7 +42,7 @@ class BareLoops {
  public:
   BareLoops(const physics_pool::WorldPtr& world, int threads);
 
-  /// Engine steps per second, and the hash of all last states. Throws what the
+  /// Returns engine steps per second, and the hash of all last states. Throws what the
   /// engine does when a rollout diverges beyond repair.
   Sample run(const physics_pool::RolloutBatch& batch);
 
@@ -50,7 +50,7 @@ class BareLoops {
   std::vector<std::unique_ptr<physics_pool::Simulator>> simulators_;  // one per thread
 };
 
-/// Since an earlier moment.
+/// Returns the seconds since an earlier moment.
 inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

@@ -44,8 +44,7 @@ double execution_cost(const physics_pool::TaskGeometry& geometry, const physics_
   const physics_pool::Scorer scorer(objective);
   double sum = scorer.final(geometry, states.back());
   for (std::size_t t = 0; t + 1 < states.size(); ++t) {
-    sum += scorer.running(
-        {.geometry = geometry, .u_before = still, .u = still, .x0 = states[t], .x1 = states[t + 1]});
+    sum += scorer.running({.geometry = geometry, .u_before = still, .u = still, .x0 = states[t], .x1 = states[t + 1]});
   }
   return sum;
 }
@@ -72,7 +71,7 @@ Result<planners::Outcome> grasp(const GraspingStudy& study, const GraspingRun& r
   world::SimulatedObjects objects(world, belief);
   auto outcome_result = run_result->perform(robot, objects, {}, stop);
   if (outcome_result) {
-    cost = execution_cost(run_result->geometry(), study.parameters.planner.objective, outcome_result->observed);
+    cost = execution_cost(run_result->geometry(), study.parameters.objective, outcome_result->observed);
   }
   return outcome_result;
 }

@@ -28,7 +28,7 @@ struct GraspingStudy {
   std::map<std::string, std::map<std::string, double>> thesis;
 };
 
-/// Of `study: grasping`; `origin` is its file.
+/// Reads a study whose file says `study: grasping`; `origin` is that file.
 Result<std::unique_ptr<Study>> read_grasping_study(yaml::Fields& fields, const std::string& origin);
 
 /// One scene planned and executed once.
@@ -47,7 +47,7 @@ struct GraspingRun {
 std::vector<GraspingRun> run_study(const GraspingStudy& study, const StudyOptions& options,
                                    const std::function<void(const GraspingRun&)>& on_run);
 
-/// A table with one row per level and controller, beside the thesis's numbers.
+/// Writes a table with one row per level and controller, beside the thesis's numbers.
 std::string study_table(const GraspingStudy& study, const std::vector<GraspingRun>& runs);
 nlohmann::json study_json(const GraspingStudy& study, const std::vector<GraspingRun>& runs);
 

@@ -102,7 +102,8 @@ Result<Trajectory> happen(const PredictionStudy& study, const Scene& scene, cons
   const Scene real = physics_pool::perturb(located(scene, batch.x0), study.reality, seed);
   auto world_result = physics_pool::World::compile(real);
   if (!world_result) return world_result.error();
-  physics_pool::ExecutionWorld world(*world_result, {.sigma = physics_pool::velocity_noise(study.reality), .seed = seed});
+  physics_pool::ExecutionWorld world(*world_result,
+                                     {.sigma = physics_pool::velocity_noise(study.reality), .seed = seed});
   Trajectory trajectory{world.state()};
   const long steps = std::lround(study.duration / study.time_step);
   for (int t = 0; t < batch.nominal.steps(); ++t) {

@@ -31,7 +31,7 @@ struct PredictionStudy {
   };
 
   std::string title;
-  std::vector<std::string> models;  ///< of make_coarse_model; the first one is the thesis's
+  std::vector<std::string> models;  ///< names that make_coarse_model takes; the first one is the thesis's
   Cases cases = Cases::kOpenLoop;
   Measure measure = Measure::kFinal;
   physics_pool::Shape shape = physics_pool::Shape::kBox;
@@ -42,7 +42,7 @@ struct PredictionStudy {
   std::vector<double> angles_deg{0.0};
   int samples = 100;  ///< initial states per group
   std::uint64_t seed = 1;
-  std::string integrator = "rk4";  ///< of the fine model
+  std::string integrator = "rk4";  ///< the fine model's
   double time_step = 0.001;        ///< s
   /// Compare with an execution world that is as badly known as this.
   physics_pool::Uncertainty reality = physics_pool::Uncertainty::kNone;
@@ -62,11 +62,11 @@ struct PredictionCases {
   std::vector<PredictionCase> cases;
 };
 
-/// Deterministic in the study's seed. Random states are drawn until nothing overlaps;
+/// Makes the cases of a study, deterministic in its seed. Random states are drawn until nothing overlaps;
 /// whether something moves is seen when they run.
 PredictionCases make_cases(const PredictionStudy& study);
 
-/// Of `study: prediction`; `origin` is its file.
+/// Reads a study whose file says `study: prediction`; `origin` is that file.
 Result<std::unique_ptr<Study>> read_prediction_study(yaml::Fields& fields, const std::string& origin);
 
 }  // namespace jostle::studies

@@ -42,7 +42,8 @@ Result<planners::Outcome> push(const PushStudy& study, const PushRun& run, std::
                                              .seed = run.seed},
                                             predictor_result->pool());
   if (!run_result) return run_result.error();
-  physics_pool::ExecutionWorld world(*truth_result, {.sigma = physics_pool::velocity_noise(study.reality), .seed = run.seed});
+  physics_pool::ExecutionWorld world(*truth_result,
+                                     {.sigma = physics_pool::velocity_noise(study.reality), .seed = run.seed});
   world::SimulatedRobot robot(world);
   world::SimulatedObjects objects(world, belief);
   return run_result->perform(robot, objects, {}, stop);

@@ -21,13 +21,13 @@ struct PushStudy {
   /// A predictor, and the threads that work for it: one thread for the fine model is
   /// the thesis's serial case, where nothing but time is parallel.
   struct Entry {
-    std::string predictor;  ///< of Predictor::make
+    std::string predictor;  ///< a text that Predictor::make takes
     int threads = 1;
   };
 
   std::string title;
   task::Parameters parameters;
-  int chapter = 6;  ///< of generate_chapter6 or 7
+  int chapter = 6;  ///< 6 or 7: scenes of generate_chapter6 or generate_chapter7
   physics_pool::Shape shape = physics_pool::Shape::kCylinder;
   int objects = 3;  ///< sliders beside the target, Chapter 7
   std::uint64_t first_seed = 1, last_seed = 20;
@@ -45,12 +45,12 @@ struct PushRun {
   planners::Outcome outcome;
 };
 
-/// Runs every combination, one at a time unless told otherwise: times are measured.
-/// Scenes in the outer loop, so that what slows the machine slows all predictors.
+/// Runs every combination, one at a time unless told otherwise, because times are measured.
+/// Scenes are in the outer loop, so that what slows the machine slows all predictors.
 std::vector<PushRun> run_study(const PushStudy& study, const StudyOptions& options,
                                const std::function<void(const PushRun&)>& on_run);
 
-/// Of `study: push`; `origin` is its file.
+/// Reads a study whose file says `study: push`; `origin` is that file.
 Result<std::unique_ptr<Study>> read_push_study(yaml::Fields& fields, const std::string& origin);
 
 }  // namespace jostle::studies

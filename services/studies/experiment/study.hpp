@@ -24,11 +24,11 @@ struct StudyOptions {
   int jobs = 1;                                                  ///< runs at a time
   std::optional<std::pair<std::uint64_t, std::uint64_t>> seeds;  ///< first and last
   std::vector<std::string> levels, controllers;                  ///< grasping
-  std::optional<std::chrono::milliseconds> timeout;              ///< of one run
+  std::optional<std::chrono::milliseconds> timeout;              ///< that of one run
   std::vector<std::string> models;                               ///< coarse models, or predictors
   std::optional<int> samples;
   std::stop_token stop;
-  /// Called from one thread at a time: a line for people.
+  /// Called from one thread at a time, with a line for people.
   std::function<void(const std::string& line)> on_progress;
 };
 
@@ -50,15 +50,15 @@ class Study {
   virtual Result<StudyReport> run(const StudyOptions& options) = 0;
 };
 
-/// `name` such as "fig-3.5": a file of the data folder experiments/ with the key `study`.
+/// Loads a study by its `name`, such as "fig-3.5": a file of the data folder experiments/ with the key `study`.
 /// Errors   kNotFound  no such file; kInvalidArgument, naming file, line and field
 Result<std::unique_ptr<Study>> load_study(const std::string& name);
 
-/// The files that decide a study's numbers, by name: its own, and that of its parameters.
+/// Returns the files that decide a study's numbers, by name: its own, and that of its parameters.
 /// Error kIo naming one that cannot be read.
 Result<std::map<std::string, std::string>> study_files(const std::string& name);
 
-/// Names and titles of all studies there are, by name.
+/// Returns names and titles of all studies there are, sorted by name.
 std::vector<std::pair<std::string, std::string>> list_studies();
 
 /// Runs `count` jobs, `at_a_time` of them; ends early when `stop` is requested. `job` is

@@ -11,7 +11,7 @@
 
 namespace jostle::studies {
 
-/// What the network is to learn; transitions that touch no slider have no part.
+/// What the network is to learn. Transitions in which the pusher meets no slider are left out.
 struct Examples {
   std::vector<float> inputs;   ///< [N][kInputs], SI
   std::vector<float> targets;  ///< [N][kOutputs], SI
@@ -24,8 +24,8 @@ struct Examples {
 
 physics_pool::PushBodies bodies_of(const DataOrigin& origin);
 
-/// Which transitions: of every n-th round of episodes, one per number of sliders, those
-/// that are held out; whole episodes, so that they are strange to the rest.
+/// Which transitions are taken. Those of every n-th round of episodes (a round has one episode per number of
+/// sliders) are held out from learning: whole episodes, so that the network has seen nothing of them.
 enum class Part { kAll, kLearn, kHeldOut };
 bool is_part(Part part, double held_out, std::size_t transition);
 
@@ -41,14 +41,14 @@ struct Accuracy {
   double all_mean = 0.0;                       ///< position error of all sliders of all transitions, m
   double all_rms = 0.0;                        ///< its root mean square, m
   double penetrating = 0.0;                    ///< share of predictions with penetration beyond 0.5 mm
-  double deepest = 0.0, mean_depth = 0.0;      ///< of those, m
+  double deepest = 0.0, mean_depth = 0.0;      ///< penetration of those, m
 };
 
-/// Per number of sliders; those without a transition are left out.
+/// Measures the accuracy per number of sliders; numbers without a transition are left out.
 std::vector<Accuracy> accuracy_of(const physics_pool::Network& network, const TransitionFile& data, Part part,
                                   double held_out);
 
-/// As a table, in mm and degrees.
+/// Writes a table, in mm and degrees.
 std::string accuracy_table(const std::vector<Accuracy>& rows);
 
 }  // namespace jostle::studies

@@ -23,7 +23,7 @@ struct DataOrigin {
   double slider_mass = 0.5;                                ///< kg
   double slider_friction = 0.2;
   double duration = 1.0;     ///< Delta_t, s
-  double time_step = 0.001;  ///< of the fine model, s
+  double time_step = 0.001;  ///< the fine model's, s
   double max_speed = 0.1;    ///< along each axis, m/s
 
   bool operator==(const DataOrigin&) const = default;
@@ -49,14 +49,14 @@ struct TransitionFile {
 /// Errors   kNotFound, kIo, kInvalidArgument; the message names the file and the remedy.
 Result<TransitionFile> read_transitions(const std::filesystem::path& file);
 
-/// Adds to a file, whole episodes at a time.
+/// A TransitionWriter adds to a file, whole episodes at a time.
 class TransitionWriter {
  public:
   /// Makes the file, or goes on after its last complete group of `group` records.
   /// Error kInvalidArgument if it is of another origin; names the field.
   static Result<TransitionWriter> open(const std::filesystem::path& file, const DataOrigin& origin, int group);
 
-  /// Records in the file.
+  /// Returns the number of records in the file.
   std::uint64_t size() const { return size_; }
 
   Result<void> append(const std::vector<Transition>& transitions);

@@ -17,7 +17,8 @@ void read_objective(yaml::Fields& in, physics_pool::Objective& objective) {
   for (const physics_pool::TermKind* kind : physics_pool::term_catalogue()) {
     in.optional(kind->name, objective[kind->name].weight);
     for (const physics_pool::TermParameter& parameter : kind->parameters) {
-      in.optional(fmt::format("{}_{}", kind->name, parameter.name).c_str(), objective.value(kind->name, parameter.name));
+      in.optional(fmt::format("{}_{}", kind->name, parameter.name).c_str(),
+                  objective.value(kind->name, parameter.name));
     }
   }
   in.optional("angle", objective.value("goal", "angle"));
@@ -30,7 +31,6 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
   PbstoOptions& planner = parameters.planner;
   ControlOptions& control = parameters.controller.control;
   planners::MpcOptions& mpc = parameters.controller.mpc;
-  physics_pool::Objective& objective = planner.objective;
   yaml::Fields fields(root, "", origin);
   fields.optional("step_duration", planner.step_duration);
   fields.optional("min_steps", planner.min_steps);
@@ -50,9 +50,7 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("screening", planner.screening);
     in.optional("screening_time_step", planner.screening_time_step);
   });
-  fields.section("objective", false, [&](yaml::Fields& in) {
-    read_objective(in, objective);
-  });
+  fields.section("objective", false, [&](yaml::Fields& in) { read_objective(in, parameters.objective); });
   fields.section("control", false, [&](yaml::Fields& in) {
     in.optional("many_iterations", control.many_iterations);
     in.optional("few_iterations", control.few_iterations);
@@ -65,7 +63,8 @@ Parameters read(const YAML::Node& root, const std::string& origin, double& timeo
     in.optional("timeout", timeout);
     int max_rollouts = 0;
     in.optional("max_rollouts", max_rollouts);
-    if (max_rollouts < 0) in.refuse("max_rollouts", fmt::format("got {}, wanted 0, for no limit, or more", max_rollouts));
+    if (max_rollouts < 0)
+      in.refuse("max_rollouts", fmt::format("got {}, wanted 0, for no limit, or more", max_rollouts));
     parameters.limits.rollouts = static_cast<std::uint64_t>(max_rollouts);
   });
   fields.section("mpc", false, [&](yaml::Fields& in) {
@@ -116,12 +115,13 @@ Result<void> check(const Parameters& parameters, double timeout, const std::stri
                  fmt::format("{}: {}: got {}, wanted {} to {}", origin, range.key, range.value, range.low, range.high)};
   }
   if (planner.sigma.empty() || planner.sigma.size() != planner.limit.size()) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}: planner.sigma: got {} numbers and {} of planner.limit, wanted one of each for every axis "
-                             "of the robot",
-                             origin, planner.sigma.size(), planner.limit.size())};
+    return Error{
+        Code::kInvalidArgument,
+        fmt::format("{}: planner.sigma: got {} numbers and {} of planner.limit, wanted one of each for every axis "
+                    "of the robot",
+                    origin, planner.sigma.size(), planner.limit.size())};
   }
-  if (auto ok = physics_pool::validate(planner.objective); !ok) {
+  if (auto ok = physics_pool::validate(parameters.objective); !ok) {
     return Error{ok.error().code, fmt::format("{}: {}", origin, ok.error().message)};
   }
   if (double(planner.rollouts) * planner.screening > physics_pool::kMaxSamples) {
@@ -171,8 +171,8 @@ Result<void> check_fit(const Parameters& parameters, const physics_pool::Scene& 
   std::vector<std::string> names;
   for (const physics_pool::Axis& axis : axes) names.push_back(axis.name);
   return invalid("parameters: planner.sigma", fmt::format("{} numbers", parameters.planner.sigma.size()),
-                 fmt::format("{} for the robot '{}': {}; experiments/ has files for grasping and for pushing", axes.size(),
-                             scene.robot.model.name, fmt::join(names, ", ")));
+                 fmt::format("{} for the robot '{}': {}; experiments/ has files for grasping and for pushing",
+                             axes.size(), scene.robot.model.name, fmt::join(names, ", ")));
 }
 
 }  // namespace jostle::task

@@ -15,6 +15,7 @@ namespace jostle::task {
 
 struct Parameters {
   planners::PbstoOptions planner;
+  physics_pool::Objective objective = physics_pool::Objective::standard();
   planners::ControllerOptions controller;
   planners::RunLimits limits;
 };

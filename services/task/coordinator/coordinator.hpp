@@ -18,8 +18,8 @@
 
 namespace jostle::task {
 
-/// One task at a time. A goal that arrives meanwhile is refused at once; a
-/// cancelled one ends within a fraction of a second, the robot standing still.
+/// The coordinator performs one task at a time. A goal that arrives meanwhile is refused at once; a
+/// cancelled task ends within a fraction of a second, the robot standing still.
 ///
 /// Feedback goes out several times a second whether there is news or not, so
 /// that silence means death. What decides a task and what it decides goes out as
@@ -28,7 +28,7 @@ class Coordinator {
  public:
   Coordinator(const wire::Participant& participant, physics_pool::AsyncPool& pool);
 
-  /// Until a stop is requested.
+  /// Runs until a stop is requested.
   void run(std::stop_token stop);
 
  private:
@@ -48,9 +48,9 @@ class Coordinator {
   std::mutex mutex_;  // guards feedback_, started_, goal_id_ and cancel_
   jostle_msgs::msg::Feedback feedback_;
   std::chrono::steady_clock::time_point started_;
-  std::uint64_t rollouts_before_ = 0;  // of the plans before the present one
+  std::uint64_t rollouts_before_ = 0;  // those of the plans before the present one
   std::string goal_id_;                // empty: no task
-  std::stop_source cancel_;            // of the present task
+  std::stop_source cancel_;            // stops the present task
 
   wire::Writer<jostle_msgs::msg::Feedback> feedback_writer_;
   wire::Writer<jostle_msgs::msg::GoalResult> result_writer_;

@@ -12,7 +12,7 @@
 
 namespace jostle::task {
 
-/// Draws feedback on `line`, which outlives it; as plain lines, one per piece of news.
+/// Draws feedback on `line`, which outlives it. Where lines are plain, each piece of news gets one.
 class Display {
  public:
   explicit Display(common::LiveLine& line) : line_(line) {}

@@ -39,8 +39,7 @@ Result<void> complete(const Arguments& arguments, RunOptions& options) {
   if (auto ok = Predictor::check(options.predictor, options.planning); !ok)
     return Error{ok.error().code, "--" + ok.error().message};
   const std::filesystem::path file =
-      arguments.parameters.empty() ? common::data_file(kind->parameters)
-                                   : std::filesystem::path(arguments.parameters);
+      arguments.parameters.empty() ? common::data_file(kind->parameters) : std::filesystem::path(arguments.parameters);
   auto parameters_result = common::read_text(file);
   if (!parameters_result) return parameters_result.error();
   options.parameters = std::move(parameters_result).value();

@@ -117,12 +117,12 @@ Result<void> Session::start_processes() {
   const auto belief_file = folder_ / "belief.yaml";
   if (auto ok = common::write_text(belief_file, physics_pool::to_yaml(options_.planning)); !ok) return ok;
 
-  auto world_result =
-      common::ChildProcess::start(program("sim"),
-                                  {scene_file.string(), "--belief", belief_file.string(), "--uncertainty",
-                                   physics_pool::to_string(options_.level), "--seed", std::to_string(options_.seed), "--rate", fmt::format("{}", options_.rate),
-                                   "--domain", domain, "--die-with-parent", std::to_string(getpid())},
-                                  folder_ / "sim.log");
+  auto world_result = common::ChildProcess::start(
+      program("sim"),
+      {scene_file.string(), "--belief", belief_file.string(), "--uncertainty", physics_pool::to_string(options_.level),
+       "--seed", std::to_string(options_.seed), "--rate", fmt::format("{}", options_.rate), "--domain", domain,
+       "--die-with-parent", std::to_string(getpid())},
+      folder_ / "sim.log");
   if (!world_result) return world_result.error();
   world_process_ = std::move(world_result).value();
 

@@ -37,8 +37,8 @@ class Session {
     std::function<void(const std::string&)> on_notice;  ///< e.g. a worker was replaced
   };
 
-  /// Error kInvalidArgument, kNotFound, kUnavailable: nothing was started; the last one
-  /// also when another run of this machine has the domain.
+  /// Starts everything. After an error (kInvalidArgument, kNotFound, kUnavailable) nothing was started; kUnavailable
+  /// also means that another run of this machine has the domain.
   static Result<std::unique_ptr<Session>> start(const RunOptions& options, Watcher watcher);
   ~Session();
 
@@ -58,7 +58,7 @@ class Session {
 
   Result<void> start_recorder();
   Result<void> start_processes();
-  Result<common::ChildProcess> start_worker(std::size_t place);  // among the workers
+  Result<common::ChildProcess> start_worker(std::size_t place);  // index among the workers
   Result<void> look_after();
   void look_after_recorder();
   Result<void> check_alive(const std::string& name, common::ChildProcess& child) const;
@@ -73,7 +73,7 @@ class Session {
   common::DomainClaim claim_;
   std::filesystem::path folder_;  // for logs and the scene; removed at the end
   std::string goal_id_;
-  bool sent_ = false;          // the goal
+  bool sent_ = false;          // whether the goal was
   bool others_heard_ = false;  // a coordinator that works for somebody else
   int workers_started_ = 0;
   Clock::time_point goal_deadline_;

@@ -32,7 +32,7 @@ Result<planners::Outcome> Composition::perform(robot_bridge::Robot& robot, perce
                                .robot = robot,
                                .objects = objects,
                                .geometry = geometry(),
-                               .objective = parts_.parameters.planner.objective,
+                               .objective = parts_.parameters.objective,
                                .world = world_,
                                .seed = parts_.seed,
                                .limits = parts_.parameters.limits};
@@ -47,9 +47,10 @@ Result<State> Composition::moved_apart(const State& x) const {
   auto result = physics_pool::separate(*believed_, x, kDepth);
   if (!result) return result.error();
   if (result->deepest > kDepth) {
-    spdlog::warn("what is measured does not fit the believed shapes: {:.1f} mm inside each other, wanted at most {:.1f}; "
-                 "planned from there all the same",
-                 1e3 * result->deepest, 1e3 * kDepth);
+    spdlog::warn(
+        "what is measured does not fit the believed shapes: {:.1f} mm inside each other, wanted at most {:.1f}; "
+        "planned from there all the same",
+        1e3 * result->deepest, 1e3 * kDepth);
   }
   return std::move(result->x);
 }

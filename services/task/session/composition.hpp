@@ -52,7 +52,7 @@ class Composition {
                                     std::stop_token stop);
 
   const planners::ControllerKind& controller() const { return *controller_; }
-  const physics_pool::TaskGeometry& geometry() const { return believed_->geometry(); }  ///< of the belief
+  const physics_pool::TaskGeometry& geometry() const { return believed_->geometry(); }  ///< that of the belief
   Parameters& parameters() { return parts_.parameters; }
   const Parameters& parameters() const { return parts_.parameters; }
 
@@ -64,7 +64,7 @@ class Composition {
   RunParts parts_;
   const planners::ControllerKind* controller_ = nullptr;
   physics_pool::Pool* pool_ = nullptr;
-  physics_pool::WorldPtr believed_;  // the planning world, for what observations are moved apart in
+  physics_pool::WorldPtr believed_;  // the planning world, in which observations are moved apart
   Hash world_;                       // its name in the pool
 };
 

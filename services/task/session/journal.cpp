@@ -31,7 +31,7 @@ void Journal::planned(const planners::Problem& problem, const planners::Plan& pl
   message.initial(problem.initial.values);
   message.iterations_allowed(problem.iterations);
   message.stream(problem.stream);
-  message.clear_hand(problem.clear_hand);
+  message.clear_hand(problem.objective.weight("obstruction") > 0);
   message.controls(plan.controls.values);
   for (const State& x : plan.states) message.states().insert(message.states().end(), x.q.begin(), x.q.end());
   message.cost(plan.cost);

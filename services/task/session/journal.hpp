@@ -12,7 +12,7 @@
 
 namespace jostle::task {
 
-/// Stands between a controller and its three ports, and tells what passes. Neither
+/// A Journal stands between a controller and its three ports, and tells what passes. Neither
 /// the controller nor the ports notice.
 ///
 /// An observation is told of once its objects were read, a plan once it was made;
@@ -26,7 +26,7 @@ class Journal {
     std::function<void(const jostle_msgs::msg::Plan&)> on_plan;
   };
 
-  /// `time`: the world's, s, when a robot reading was taken.
+  /// `time`: gives the world's time, s, at which the newest robot reading was taken.
   Journal(std::string goal_id, double step_duration, std::function<double()> time, Listener listener);
 
   Journal(const Journal&) = delete;

@@ -26,7 +26,7 @@ class Task {
   static Result<Task> prepare(const jostle_msgs::msg::Goal& goal, physics_pool::AsyncPool& pool,
                               std::function<void(const std::string&)> on_split = {});
 
-  /// Who hears of it.
+  /// Who hears of a task.
   struct Watch {
     planners::OnEvent on_event;
     planners::OnProgress on_progress;
@@ -39,7 +39,7 @@ class Task {
                                     std::stop_token stop);
 
   const physics_pool::Scene& execution_scene() const { return execution_; }
-  const physics_pool::TaskGeometry& geometry() const { return run_.geometry(); }  ///< of the planning scene
+  const physics_pool::TaskGeometry& geometry() const { return run_.geometry(); }  ///< that of the planning scene
   Parameters& parameters() { return run_.parameters(); }
 
  private:
@@ -51,7 +51,7 @@ class Task {
   Composition run_;
 };
 
-/// A goal that is taken up now, by this build on this machine.
+/// Describes the run of a goal that is taken up now, by this build on this machine.
 jostle_msgs::msg::TaskRun describe_run(const jostle_msgs::msg::Goal& goal);
 
 }  // namespace jostle::task

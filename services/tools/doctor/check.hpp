@@ -12,7 +12,7 @@ enum class Verdict {
   kFail,  ///< Jostle cannot work like this
 };
 
-/// "ok", "warn" or "FAIL".
+/// Returns "ok", "warn" or "FAIL".
 inline const char* word(Verdict verdict) {
   switch (verdict) {
     case Verdict::kOk:

@@ -23,7 +23,7 @@ const wire::Topic<Goal> kBack{"rt/doctor/back", kTask, wire::Scope::kDomain};
 Echo::Echo(const wire::Participant& participant)
     : back_(participant, kBack), there_(participant, kThere, kQueue), repeater_([this](std::stop_token stop) {
         while (!stop.stop_requested()) {
-          const auto goal = there_.take(wire::TimePoint::max(), stop);
+          const auto goal = there_.take(TimePoint::max(), stop);
           if (!goal) continue;
           ++heard_;
           (void)back_.write(*goal);  // lost or not taken: the caller measures both as silence
@@ -33,7 +33,7 @@ Echo::Echo(const wire::Participant& participant)
 Caller::Caller(const wire::Participant& participant, std::string session)
     : session_(std::move(session)), there_(participant, kThere), back_(participant, kBack, kQueue) {}
 
-bool Caller::meet(wire::TimePoint deadline) {
+bool Caller::meet(TimePoint deadline) {
   while (!there_.wait_for_readers(Clock::now() + kGlance) || back_.matched() == 0) {
     if (Clock::now() >= deadline) return false;
     if (back_.matched() == 0) back_.take(Clock::now() + kGlance);  // waits: nobody has been asked yet
@@ -41,12 +41,12 @@ bool Caller::meet(wire::TimePoint deadline) {
   return true;
 }
 
-void Caller::settle(wire::TimePoint deadline) {
+void Caller::settle(TimePoint deadline) {
   while (Clock::now() < deadline && !call(1, Clock::now() + kAnswer)) {
   }
 }
 
-std::optional<std::chrono::nanoseconds> Caller::call(std::size_t bytes, wire::TimePoint deadline) {
+std::optional<std::chrono::nanoseconds> Caller::call(std::size_t bytes, TimePoint deadline) {
   Goal goal;
   goal.goal_id(fmt::format("{}/{}", session_, calls_++));
   goal.execution_scene(std::string(bytes, '.'));

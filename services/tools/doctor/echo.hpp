@@ -15,7 +15,7 @@
 
 namespace jostle::tools {
 
-/// Repeats what it hears until it is destroyed.
+/// An Echo repeats what it hears until it is destroyed.
 class Echo {
  public:
   /// Throws wire::SetupError.
@@ -30,21 +30,21 @@ class Echo {
   std::jthread repeater_;  // last: ends before what it uses is gone
 };
 
-/// The other end.
+/// A Caller is the other end: it says samples and waits for them to come back.
 class Caller {
  public:
   /// `session`: whose answers count. Throws wire::SetupError.
   Caller(const wire::Participant& participant, std::string session);
 
   /// Whether both directions found each other by the deadline.
-  bool meet(wire::TimePoint deadline);
+  bool meet(TimePoint deadline);
 
   /// Waits until something comes back, or the deadline: the other side may find our reader later than
   /// we found its writer, and what it answers until then is lost.
-  void settle(wire::TimePoint deadline);
+  void settle(TimePoint deadline);
 
-  /// Time there and back of a sample of that many bytes; nothing if it did not come back by the deadline.
-  std::optional<std::chrono::nanoseconds> call(std::size_t bytes, wire::TimePoint deadline);
+  /// Returns the time there and back of a sample of that many bytes; nothing if it did not come back by the deadline.
+  std::optional<std::chrono::nanoseconds> call(std::size_t bytes, TimePoint deadline);
 
  private:
   std::string session_;

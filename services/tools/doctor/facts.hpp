@@ -14,7 +14,7 @@ namespace jostle::tools {
 
 struct Facts {
   std::string host;
-  std::string version;  ///< of Jostle
+  std::string version;  ///< Jostle's
   std::string types;    ///< hash of all wire types
   int domain = 0;
   std::string discovery;  ///< as --discovery has it
@@ -23,19 +23,19 @@ struct Facts {
   std::vector<Check> checks;
 };
 
-/// Of this process and its environment.
+/// Collects the facts of this process and its environment.
 Facts facts_of(int domain, std::vector<Check> checks);
 
 nlohmann::json to_json(const Facts& facts);
-/// Error kInvalidArgument: another doctor's facts are no such.
+/// Reads another doctor's facts. Error kInvalidArgument: they are none.
 Result<Facts> parse_facts(const nlohmann::json& facts);
 
 nlohmann::json to_json(const std::vector<Check>& checks);
 
-/// Nanoseconds since 1970 by the wall clock, whose agreement is one of the checks.
+/// Returns nanoseconds since 1970 by the wall clock. That both hosts' clocks agree is one of the checks.
 std::int64_t wall_clock_ns();
 
-/// The same on both sides: `text`, filled up to at most as many bytes as UDP carries.
+/// Makes a datagram of `text`, the same on both sides: filled up to `bytes`, or to as many as UDP carries.
 std::string test_datagram(const std::string& text, std::size_t bytes);
 
 }  // namespace jostle::tools

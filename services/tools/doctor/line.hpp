@@ -8,22 +8,22 @@
 
 namespace jostle::tools {
 
-/// Beside the discovery server's.
+/// The doctors' TCP port, next to the discovery server's.
 inline constexpr int kDoctorPort = 11812;
 
-/// One connection. Whatever comes in is somebody else's: what is no JSON, or too long, ends it.
+/// A Line is one connection. What comes in is not trusted: anything that is no JSON, or too long, ends it.
 class Line {
  public:
   explicit Line(Socket socket) : socket_(std::move(socket)) {}
 
-  /// Error kUnavailable: why not, as the system says it.
+  /// Connects to another doctor. Error kUnavailable: why not, as the system says it.
   static Result<Line> connect(in_addr address, int port, std::chrono::milliseconds patience);
 
-  /// Nothing when the other side is gone or silent until the deadline.
+  /// Waits for a message; nothing when the other side is gone, or silent until the deadline.
   std::optional<nlohmann::json> hear(TimePoint deadline, std::stop_token stop = {});
   bool say(const nlohmann::json& message);
 
-  /// Question and answer. Error kUnavailable.
+  /// Says a question and waits for the answer. Error kUnavailable.
   Result<nlohmann::json> ask(const nlohmann::json& question);
 
   std::optional<in_addr> other() const;
@@ -33,13 +33,13 @@ class Line {
   std::string pending_;  // bytes after the last line
 };
 
-/// Where others connect.
+/// A Door is where others connect.
 class Door {
  public:
-  /// Error kUnavailable: the port is taken.
+  /// Opens a door. Error kUnavailable: the port is taken.
   static Result<Door> open(int port);
 
-  /// Whoever comes next; nothing after a stop request.
+  /// Waits for whoever comes next; nothing after a stop request.
   std::optional<Line> next(std::stop_token stop);
 
  private:

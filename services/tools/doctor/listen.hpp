@@ -13,8 +13,8 @@
 
 namespace jostle::tools {
 
-/// Answers whoever comes to the door, one after the other, until a stop request: what this machine is, what came
-/// through; sends datagrams back to the asker, and repeats samples over DDS.
+/// Answers whoever comes to the door, one after the other, until a stop request: says what this machine is and what
+/// came through, sends datagrams back to the asker, and repeats samples over DDS.
 ///
 /// `examine` looks at this machine; `notice` hears who came. Throws wire::SetupError.
 void listen_to_peers(const wire::Participant& participant, Door door,

@@ -8,13 +8,13 @@
 
 namespace jostle::tools {
 
-/// Cores, and whether others keep them busy.
+/// Checks the cores, and whether others keep them busy.
 Check check_cores();
 
-/// MuJoCo's and Fast DDS's versions.
+/// Checks MuJoCo's and Fast DDS's versions.
 std::vector<Check> check_versions();
 
-/// A worker lies beside this program.
+/// Checks that a worker lies beside this program.
 Check check_worker();
 
 }  // namespace jostle::tools

@@ -9,18 +9,18 @@
 
 namespace jostle::tools {
 
-/// Whether multicast has a route, and whether a datagram that is sent to the
+/// Checks whether multicast has a route, and whether a datagram that is sent to the
 /// group of Fast DDS's discovery comes back, on the loopback and on the
 /// interface of the route. Sends for real, to a port of its own.
 std::vector<Check> check_multicast();
 
-/// The kernel's limit on receive buffers against what large samples need.
+/// Checks the kernel's limit on receive buffers against what large samples need.
 Check check_udp_buffers();
 
-/// The file of transports and QoS can be used. Before any participant is made.
+/// Checks that the file of transports and QoS can be used. Call it before any participant is made.
 Check check_profiles();
 
-/// What --domain or ROS_DOMAIN_ID says is a domain.
+/// Checks that what --domain or ROS_DOMAIN_ID says is a domain.
 Check check_domain(std::optional<int> wanted);
 
 }  // namespace jostle::tools

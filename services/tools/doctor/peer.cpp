@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <thread>
 
+#include "idl/types/time.hpp"
 #include "services/common/charts/statistics.hpp"
 #include "services/common/process/domain.hpp"
 #include "services/tools/doctor/echo.hpp"
@@ -40,8 +41,6 @@ constexpr std::size_t kFragmented =
     60'000;  // bytes; the largest packets of DDS are 65 500, in 45 fragments of Ethernet
 constexpr std::chrono::seconds kSample{5};
 constexpr double kSlow = 0.5;  // s there and back for 1 MiB; 14 ms over a link of 1 Gbit/s
-
-double seconds(std::chrono::nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 struct Pair {
   Line& line;

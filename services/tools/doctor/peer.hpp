@@ -12,10 +12,10 @@ namespace jostle::tools {
 
 struct PeerOptions {
   std::string host;  ///< where `jostle doctor --listen` runs
-  int port = 0;      ///< TCP, of its door
+  int port = 0;      ///< TCP port of its door
 };
 
-/// In this order, as far as it makes sense to go on:
+/// Checks, in this order, as far as it makes sense to go on:
 ///
 ///   peer               the name resolves, the other doctor answers
 ///   version, domain    both have the same; so with discovery and identity
@@ -31,7 +31,7 @@ struct PeerOptions {
 /// Time  seconds; half a minute where nothing gets through.
 std::vector<Check> check_peer(const PeerOptions& peer, const wire::ParticipantOptions& options);
 
-/// For discovery by server: whether one answered. In other modes nothing to say.
+/// Checks whether discovery servers answer. In other modes of discovery there is nothing to check.
 std::vector<Check> check_discovery_servers(const wire::Participant& participant);
 
 }  // namespace jostle::tools

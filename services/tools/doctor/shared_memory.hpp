@@ -22,7 +22,7 @@ struct Leftover {
 
 struct LeftoverSearch {
   std::filesystem::path folder = "/dev/shm";
-  /// What is younger may be half made; a participant makes its files within milliseconds.
+  /// Younger files may be half made; a participant makes its files within milliseconds.
   std::chrono::seconds settled{5};
 };
 
@@ -33,10 +33,10 @@ struct LeftoverSearch {
 /// is whatever has not settled.
 std::vector<Leftover> find_leftovers(const LeftoverSearch& search = {});
 
-/// Removes what it can.
+/// Removes the leftovers that it can remove.
 void remove_leftovers(const std::vector<Leftover>& leftovers);
 
-/// /dev/shm is there, writable, and has room.
+/// Checks that /dev/shm is there, writable, and has room.
 Check check_shared_memory();
 
 Check check_leftovers();

@@ -11,10 +11,9 @@
 #include <utility>
 
 #include "idl/types/result.hpp"
+#include "idl/types/time.hpp"
 
 namespace jostle::tools {
-
-using TimePoint = std::chrono::steady_clock::time_point;
 
 class Socket {
  public:
@@ -43,28 +42,29 @@ class Socket {
 
 inline in_addr any_address() { return {htonl(INADDR_ANY)}; }
 
-/// `port` as one says it, 7400.
+/// Makes the address of a port; `port` is a plain number, such as 7400.
 sockaddr_in endpoint(in_addr address, int port);
 const sockaddr* generic(const sockaddr_in& address);
 std::optional<sockaddr_in> own_endpoint(const Socket& socket);
 std::string to_string(in_addr address);
 
-/// The address that datagrams to `other` would leave from, by the kernel's routes.
+/// Returns the address that datagrams to `other` would leave from, by the kernel's routes.
 std::optional<in_addr> route_to(in_addr other);
 
-/// What went wrong in the last system call, as the name of a step.
+/// Says that a step failed, and why the last system call did.
 std::string failed_step(const std::string& step);
 
 /// Fast DDS's discovery group: RTPS 2.2, Sec. 9.6.1.4.
 inline constexpr const char* kGroup = "239.255.0.1";
 
-/// Waits for datagrams at one port.
+/// An Ear waits for datagrams at one port.
 class Ear {
  public:
-  /// At a port of this host; 0: any. `group_through`: hears the discovery group through this interface, too.
+  /// Opens an ear at a port of this host; 0: any. `group_through`: it hears the discovery group through this interface,
+  /// too.
   /// Error: the step that failed.
   static Result<Ear> open(int port, std::optional<in_addr> group_through = {});
-  /// At the first port that a participant of the domain could have.
+  /// Opens an ear at the first free port of those that participants of the domain could have.
   static Result<Ear> open_in_domain(int domain);
 
   int port() const { return port_; }
@@ -79,7 +79,7 @@ class Ear {
   int port_;
 };
 
-/// `through`: the interface, for datagrams to the group. Error: the step that failed.
+/// Sends a datagram. `through`: the interface, for datagrams to the group. Error: the step that failed.
 Result<void> send_datagram(const std::string& datagram, in_addr to, int port, std::optional<in_addr> through = {});
 
 }  // namespace jostle::tools

@@ -14,14 +14,14 @@ struct Program {
   std::string purpose;  ///< one line
 };
 
-/// Where a program of that name is or would be.
+/// Returns where a program of that name is or would be.
 std::filesystem::path program_file(const std::filesystem::path& folder, const std::string& name);
 
-/// Those of Jostle's programs that are there, sorted by name. Others named
+/// Lists those of Jostle's programs that are there, sorted by name. Others named
 /// jostle_… (tests, a user's own) can be run, yet are not listed.
 std::vector<Program> installed_programs(const std::filesystem::path& folder);
 
-/// The program whose name takes the fewest edits to reach, or "" when none is near.
+/// Finds the program whose name takes the fewest edits to reach; "" when none is near.
 std::string nearest(const std::vector<Program>& programs, const std::string& name);
 
 }  // namespace jostle::tools

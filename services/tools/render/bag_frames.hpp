@@ -14,11 +14,11 @@ namespace jostle::tools {
 struct BagFramesOptions {
   std::string goal;                               ///< which run; empty: the bag's only one
   bags::RunClock clock = bags::RunClock::kWorld;  ///< kWall shows how long the robot waited for plans
-  double per_second = 20.0;                       ///< frames, of the run's clock
-  int count = 0;                                  ///< so many, evenly spread, instead; 0: by time
+  double per_second = 20.0;                       ///< frames per second of the run's clock
+  int count = 0;                                  ///< so many frames, evenly spread, instead; 0: by time
 };
 
-/// What was measured while a run went on: the execution scene in its recorded states, each
+/// Loads what was measured while a run went on: the execution scene in its recorded states, each
 /// with its time, action and plan below.
 /// Errors   those of BagReader, read_runs, select_runs and RecordedMotion
 ///          kInvalidArgument  several runs and none chosen

@@ -14,8 +14,8 @@ namespace jostle::tools {
 
 struct DrawOptions {
   physics_pool::RenderOptions picture;
-  int columns = 4;           ///< of a sheet
-  double per_second = 20.0;  ///< pictures of a film
+  int columns = 4;           ///< pictures side by side on a sheet
+  double per_second = 20.0;  ///< pictures per second of a film
   std::function<void(std::size_t drawn, std::size_t all)> on_progress;
 };
 
@@ -32,7 +32,7 @@ struct DrawOptions {
 Result<void> draw(const Frames& frames, const std::filesystem::path& output, const DrawOptions& options,
                   std::stop_token stop);
 
-/// Whether draw() makes a sheet of that.
+/// Whether draw() makes a sheet for that name.
 bool is_sheet(const std::filesystem::path& output);
 
 }  // namespace jostle::tools

@@ -28,7 +28,7 @@ struct Frames {
 /// Errors   kIo, kInvalidArgument; the message names file, field, got and wanted.
 Result<Frames> load_frames(const std::filesystem::path& file);
 
-/// The start of a scene, without a caption.
+/// Loads a scene and takes its start as the only frame, without a caption.
 /// Errors   those of load_scene.
 Result<Frames> load_start(const std::filesystem::path& file);
 

@@ -123,9 +123,10 @@ Result<std::string> show(const Arguments& arguments) {
   for (const physics_pool::Fixture& fixture : scene.fixtures) {
     const bool box = fixture.shape == physics_pool::Shape::kBox;
     print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", fixture.name, box ? "box" : "cylinder",
-               box ? fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * fixture.size[0], 1e3 * fixture.size[1], 1e3 * fixture.size[2])
-                   : fmt::format("r {:.1f}, h {:.1f}", 1e3 * fixture.radius, 1e3 * fixture.height),
-               "fixed", "", fixture.pose.position[0], fixture.pose.position[1]);
+          box ? fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * fixture.size[0], 1e3 * fixture.size[1],
+                            1e3 * fixture.size[2])
+              : fmt::format("r {:.1f}, h {:.1f}", 1e3 * fixture.radius, 1e3 * fixture.height),
+          "fixed", "", fixture.pose.position[0], fixture.pose.position[1]);
   }
   if (physics_pool::find_task_kind(scene.task.kind)->has_goal) show_disc("(goal)", scene.task.goal);
   if (scene.task.obstacle) show_disc("(obstacle)", *scene.task.obstacle);

@@ -13,7 +13,7 @@ using physics_pool::RolloutBatch;
 using physics_pool::RolloutOutcome;
 
 constexpr std::uint8_t kHitFixture = 1;  // of TaskResult::facts
-constexpr std::int64_t kSimulate = -1;  // of BatchDescription::wait
+constexpr std::int64_t kSimulate = -1;   // of BatchDescription::wait
 
 std::vector<msg::Term> to_wire(const std::vector<physics_pool::Term>& terms) {
   std::vector<msg::Term> wire;
@@ -28,7 +28,8 @@ std::vector<msg::Term> to_wire(const std::vector<physics_pool::Term>& terms) {
 
 std::vector<physics_pool::Term> from_wire(const std::vector<msg::Term>& wire) {
   std::vector<physics_pool::Term> terms;
-  for (const msg::Term& term : wire) terms.push_back({.kind = term.kind(), .weight = term.weight(), .values = term.values()});
+  for (const msg::Term& term : wire)
+    terms.push_back({.kind = term.kind(), .weight = term.weight(), .values = term.values()});
   return terms;
 }
 
@@ -138,7 +139,8 @@ msg::AssignmentResult to_wire(const RolloutOutcome& outcome) {
   wire.thawed(outcome.thawed);
   wire.at_goal(outcome.at_goal);
   wire.step_costs(outcome.step_costs);
-  for (const physics_pool::StepFacts& facts : outcome.facts) wire.facts().push_back(facts.robot_hit_fixture ? kHitFixture : 0);
+  for (const physics_pool::StepFacts& facts : outcome.facts)
+    wire.facts().push_back(facts.robot_hit_fixture ? kHitFixture : 0);
   wire.reason(outcome.reason);
   if (!outcome.trajectory.empty()) {
     wire.nq(static_cast<std::uint32_t>(outcome.trajectory.front().q.size()));

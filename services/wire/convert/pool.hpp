@@ -13,11 +13,11 @@ Hash from_wire(const jostle_msgs::msg::WorldHash& wire);
 
 jostle_msgs::msg::BatchDescription to_wire(const physics_pool::RolloutBatch& batch);
 
-/// Total: whatever the wire holds becomes a batch, to be judged by
+/// Never fails: whatever the wire holds becomes a batch, to be judged by
 /// physics_pool::validate.
 physics_pool::RolloutBatch from_wire(const jostle_msgs::msg::BatchDescription& wire);
 
-/// The outcome only; who asked and who answers is the sender's to fill in.
+/// Converts the outcome only; the sender fills in who asked and who answers.
 jostle_msgs::msg::AssignmentResult to_wire(const physics_pool::RolloutOutcome& outcome);
 
 /// Errors   the worker's own, if it refused the assignment

@@ -14,7 +14,7 @@
 
 namespace jostle::wire {
 
-/// Error kInvalidArgument: not a T.
+/// Reads a T. Error kInvalidArgument: the bytes are none.
 template <class T>
 Result<T> from_cdr(std::span<const std::byte> data) {
   // The decoder only reads; its signature predates const.

@@ -22,7 +22,8 @@
 
 namespace jostle::wire {
 
-/// Of a GUID's first 12 bytes, which all entities of a participant share.
+/// Returns the id of an entity's participant. It follows from the GUID's first 12 bytes, which all entities of a
+/// participant share.
 std::uint64_t participant_id(const eprosima::fastrtps::rtps::GUID_t& guid);
 
 Guid to_guid(const eprosima::fastrtps::rtps::GUID_t& guid);
@@ -35,7 +36,7 @@ class Participant::Core {
   Core(const Core&) = delete;
   Core& operator=(const Core&) = delete;
 
-  /// A topic that is shared by all its writers and readers here; give it back.
+  /// Returns a topic that is shared by all its writers and readers here; release it in the end.
   /// Throws SetupError.
   eprosima::fastdds::dds::Topic* acquire_topic(const std::string& name, eprosima::fastdds::dds::TypeSupport type);
   void release_topic(eprosima::fastdds::dds::Topic* topic);
@@ -79,7 +80,7 @@ class Peers {
     return changed_.wait_until(lock, deadline, [&] { return static_cast<int>(peers_.size()) >= count; });
   }
 
-  /// Ascending, each once.
+  /// Returns the ids of their participants, ascending, each once.
   std::vector<std::uint64_t> participants() const {
     std::vector<std::uint64_t> ids;
     {
@@ -102,22 +103,22 @@ class Peers {
   std::vector<Guid> peers_;
 };
 
-/// Samples that a reader keeps which keeps all: it only holds those whose predecessors are
+/// The most samples that a reader of depth kKeepAll holds. It only holds those whose predecessors are
 /// still on their way.
 inline constexpr int kMostKept = 1 << 16;
 
-/// What a participant of the profile udp or shared_memory is where the file of profiles does not
-/// say; nothing for other names.
+/// Returns the profile udp or shared_memory for when the file of profiles does not have it; nothing
+/// for other names.
 std::optional<eprosima::fastdds::dds::DomainParticipantQos> built_in_participant(const std::string& profile);
 
-/// Names of the profiles for an endpoint, the first that the file has is in force: of its topic, of
+/// Returns names of profiles for an endpoint, of which the first that the file has is in force: that of its topic, of
 /// the topic without the namespace, of the topic's kind.
 std::vector<std::string> profiles_for(const Participant::Core& core, const std::string& topic, const Qos& qos);
 
-/// A writer of this Qos where the file of profiles does not say; `apply` is a reader's.
+/// Sets up a writer by its Qos, where the file of profiles says nothing; `apply` does so for readers.
 void apply_to_writer(const Qos& qos, eprosima::fastdds::dds::DataWriterQos& writer);
 
-/// The part of a Qos that writers and readers write the same way.
+/// Sets what writers and readers have alike.
 template <class EndpointQos>
 void apply(const Qos& qos, EndpointQos& endpoint) {
   using namespace eprosima::fastdds::dds;

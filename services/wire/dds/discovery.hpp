@@ -21,7 +21,7 @@ struct Discovery {
   };
   struct Host {
     std::string address;     ///< IPv4
-    std::uint16_t port = 0;  ///< of a server
+    std::uint16_t port = 0;  ///< that of a server
     bool operator==(const Host&) const = default;
   };
 
@@ -29,7 +29,7 @@ struct Discovery {
   std::vector<Host> hosts;
 };
 
-/// The IPv4 address that this is, or that this name has. Error kNotFound.
+/// Returns the IPv4 address of a host, given as an address or by a name. Error kNotFound.
 Result<std::string> resolve(const std::string& host);
 
 /// Reads

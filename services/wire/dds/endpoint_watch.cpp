@@ -12,7 +12,7 @@ namespace {
 
 using namespace eprosima::fastrtps::rtps;
 
-// Of a writer's or a reader's announcement, which have the same words for these.
+// Reads a writer's or a reader's announcement; they have the same words for these.
 template <class ProxyData>
 Endpoint describe(Endpoint::Kind kind, const ProxyData& data) {
   return {.kind = kind,

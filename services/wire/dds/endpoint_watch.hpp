@@ -26,7 +26,7 @@ struct Endpoint {
   bool latched = false;   ///< transient-local or more, likewise
 };
 
-/// Hears of every endpoint of the domain as it comes and goes. Give it to
+/// An EndpointWatch hears of every endpoint of the domain as it comes and goes. Give it to
 /// ParticipantOptions::watch, of one participant.
 ///
 /// Threads  the callbacks run on the middleware's threads, before a sample of that writer
@@ -43,7 +43,7 @@ class EndpointWatch {
 
   eprosima::fastdds::dds::DomainParticipantListener& listener();
 
-  /// Keeps what it hears to itself from now on. For join().
+  /// From now on keeps what it hears to itself. For join().
   void hold();
   /// Tells what it heard since hold(), or forgets it, and holds back nothing more.
   void let_go(bool tell);

@@ -7,7 +7,7 @@
 
 namespace jostle::wire {
 
-/// As on the wire; its first 12 bytes are those of its participant.
+/// A Guid is as on the wire; its first 12 bytes are those of its participant.
 using Guid = std::array<std::uint8_t, 16>;
 
 }  // namespace jostle::wire

@@ -54,7 +54,7 @@ class Doorkeeper final : public Listener {
   // Whether it knows by then what to think of everybody who came.
   bool knows_all_by(std::chrono::steady_clock::time_point deadline) {
     std::unique_lock lock(mutex_);
-    // Of one participant either callback may come first.
+    // Either callback of a participant may come first.
     return changed_.wait_until(lock, deadline, [this] {
       return std::ranges::all_of(came_, [this](const GUID_t& guid) { return judged_.contains(guid); });
     });

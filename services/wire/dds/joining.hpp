@@ -19,17 +19,17 @@ struct Joined {
 /// Creates a participant that `watch` (may be empty) hears from. A protected one has
 /// authenticated with everybody who answers when this returns: after kHail where all is well.
 ///
-/// Of participants that come at the same moment, Fast DDS 2.9.1 now and then loses a pair: one
+/// When participants come at the same moment, Fast DDS 2.9.1 now and then keeps two of them apart: one
 /// side drops the other's first announcement while it sets itself up, takes later ones for known,
 /// and never answers the other's requests, which come each second (4 of 202 groups of four on two
-/// cores had such a pair). Only somebody new is answered: who still waits after kPatience joins
-/// again, once. A stranger who never answers costs every start as much, and gets nothing.
+/// cores had such a pair). Only a newcomer is answered, so a participant that still waits after kPatience
+/// joins again, once. A stranger who never answers makes every start wait as long, and gets nothing.
 Joined join(int domain, const eprosima::fastdds::dds::DomainParticipantQos& qos,
             const std::shared_ptr<EndpointWatch>& watch);
 
-/// Those who are there answer a newcomer within some milliseconds.
+/// How long a newcomer listens for others. Those who are there answer within some milliseconds.
 inline constexpr std::chrono::milliseconds kHail{200};
-/// Of a handshake; the middleware repeats after 1 s what was lost.
+/// How long a handshake may take; the middleware repeats after 1 s what was lost.
 inline constexpr std::chrono::milliseconds kPatience{2500};
 
 }  // namespace jostle::wire

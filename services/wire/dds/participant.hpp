@@ -17,30 +17,30 @@ namespace jostle::wire {
 
 class EndpointWatch;
 
-/// The middleware refused an entity: a wrong profile, or no memory. Thrown
+/// Thrown if the middleware refuses an entity: a wrong profile, or no memory. That happens only
 /// while a program sets itself up, never later; `main` reports it.
 struct SetupError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The version of Fast DDS that this program was compiled with, such as "2.9.1".
+/// Returns the version of Fast DDS that this program was compiled with, such as "2.9.1".
 const char* middleware_version();
 
 struct ParticipantOptions {
   std::string name = "jostle";           ///< as tools list it
   std::optional<int> domain;             ///< 0 to 232; else ROS_DOMAIN_ID, else 0
   std::shared_ptr<EndpointWatch> watch;  ///< hears of all others from the first moment; may be empty
-  std::optional<std::string> identity;   ///< folder; empty: unprotected; else JOSTLE_SECURE
+  std::optional<std::string> identity;   ///< its folder; "": unprotected; not given: JOSTLE_SECURE
 };
 
-/// A discovery server: listens there, introduces participants to each other.
+/// A discovery server listens at an address, and introduces participants to each other.
 struct ServerOptions {
   std::string address = "0.0.0.0";  ///< IPv4 to listen at; 0.0.0.0: all of this host
   std::uint16_t port = kServerPort;
   int id = 0;  ///< its place in the list of servers that clients are given
 };
 
-/// One per process: two can deadlock at shutdown (Fast DDS #6193). A copy is
+/// A process has one Participant: two can deadlock at shutdown (Fast DDS #6193). A copy is
 /// another handle to the same participant; writers and readers hold one, so
 /// everything may be destroyed in any order.
 ///
@@ -67,7 +67,7 @@ class Participant {
   ///          kUnavailable      the middleware refused
   static Result<Participant> open(const ParticipantOptions& options);
 
-  /// The same as a discovery server. Unprotected only: on a protected domain the
+  /// Opens a participant that is a discovery server. Unprotected only: on a protected domain the
   /// server of Fast DDS 2.9.1 aborts.
   static Result<Participant> open_server(const ParticipantOptions& options, const ServerOptions& server);
 
@@ -77,12 +77,12 @@ class Participant {
   /// WriterBase::matched_participants() gives elsewhere.
   std::uint64_t id() const;
 
-  /// The namespace of its robot's topics; "": none.
+  /// Returns the namespace of its robot's topics; "": none.
   const std::string& space() const;
-  /// A topic's name with the namespace in it, where the scope asks for it.
+  /// Returns a topic's name, with the namespace in it where the scope asks for it.
   std::string wire_name(const std::string& topic, Scope scope) const;
 
-  /// Names of the participants found so far, as ParticipantOptions::name has them; ours is among them.
+  /// Returns names of the participants found so far, as ParticipantOptions::name has them; ours is among them.
   std::vector<std::string> others() const;
 
   class Core;

@@ -11,14 +11,14 @@ namespace jostle::wire {
 
 struct ProfilesFile {
   std::filesystem::path path;  ///< empty: there is none
-  bool shared = false;         ///< with other programs of Fast DDS: profiles of other names are theirs
+  bool shared = false;         ///< whether other programs of Fast DDS use it: profiles of other names are theirs
 };
 
-/// The one in force: JOSTLE_PROFILES, else FASTRTPS_DEFAULT_PROFILES_FILE, else profiles.xml in the
+/// Returns the file in force: JOSTLE_PROFILES, else FASTRTPS_DEFAULT_PROFILES_FILE, else profiles.xml in the
 /// share folder of this program (deploy/profiles.xml, which is /etc/jostle/profiles.xml once installed).
 ProfilesFile profiles_file();
 
-/// Has the middleware know the profiles of this file and no others:
+/// Gives the middleware the profiles of this file, and no others:
 ///
 ///   participant                udp, shared_memory, or any name that JOSTLE_DDS_TRANSPORT gives
 ///   data_writer, data_reader   a kind of topic (qos.hpp), or one topic's name on the wire
@@ -29,7 +29,7 @@ ProfilesFile profiles_file();
 ///                            names that nothing asks for, promises that writers and readers cannot keep
 Result<void> load_profiles(const ProfilesFile& file);
 
-/// Bytes that sockets of the profile udp ask the kernel for, with the profiles loaded.
+/// Returns the bytes of buffer that sockets of the profile udp ask the kernel for, with the profiles loaded.
 std::uint32_t socket_buffer();
 
 }  // namespace jostle::wire

@@ -19,11 +19,11 @@ struct RawTopic {
   Qos qos;
 };
 
-/// Whether raw writers and readers can have that type, which is keyed or not: without a
-/// key any, with a key those of this system, whose code finds the key in a sample.
+/// Whether raw writers and readers can have a type. They can have any type without a key, and those keyed
+/// types of this system whose code finds the key in a sample.
 bool can_be_raw(const std::string& type, bool keyed);
 
-/// A participant uses a type either raw or as what it is, not both: SetupError.
+/// Writes samples as bytes. A participant uses a type either raw or as what it is; using both is a SetupError.
 ///
 /// Threads  safe from any thread.
 class RawWriter : public WriterBase {
@@ -31,7 +31,7 @@ class RawWriter : public WriterBase {
   /// Throws SetupError.
   RawWriter(const Participant& participant, const RawTopic& topic);
 
-  /// As Writer::write; false also for less than the encapsulation.
+  /// Does as Writer::write does; false also for a sample shorter than its encapsulation.
   [[nodiscard]] bool write(std::span<const std::byte> sample);
 };
 

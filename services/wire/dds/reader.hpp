@@ -23,14 +23,14 @@ namespace jostle::wire {
 struct Origin {
   std::uint64_t participant = 0;  ///< Participant::id() of who wrote it
   Guid writer{};
-  std::uint64_t sequence = 0;    ///< of the writer, counting from 1: a gap is a lost sample
+  std::uint64_t sequence = 0;    ///< the writer's, counting from 1: a gap is a lost sample
   std::int64_t source_time = 0;  ///< when it was written, ns since the Unix epoch, on the writer's clock
 };
 
-/// What did not reach a reader, so far.
+/// Counts of what has not reached a reader, so far.
 struct ReaderTroubles {
   std::uint64_t lost = 0;          ///< samples that the middleware gave up
-  std::uint64_t rejected = 0;      ///< had no room when they came; a reliable writer sends them again
+  std::uint64_t rejected = 0;      ///< samples without room when they came; a reliable writer sends them again
   std::uint64_t incompatible = 0;  ///< writers that offer less than is asked for
 };
 
@@ -46,10 +46,10 @@ class ReaderBase {
   ReaderBase(const ReaderBase&) = delete;
   ReaderBase& operator=(const ReaderBase&) = delete;
 
-  /// Writers found so far, and gone ones not counted.
+  /// Returns the number of writers that were found and have not gone.
   int matched() const;
 
-  /// Participant::id() of every one that has a writer for us; each once, ascending.
+  /// Returns Participant::id() of every participant that has a writer for us; each once, ascending.
   std::vector<std::uint64_t> matched_participants() const;
 
   /// Whether that participant has a writer for us; the counterpart of WriterBase::reaches().
@@ -62,7 +62,7 @@ class ReaderBase {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Calls back for every sample, in the order of each writer.
+/// A Reader calls back for every sample; those of one writer in its order.
 ///
 /// Threads  the callback runs on the middleware's thread, one call at a time.
 ///          It must be quick, must not throw, and must not make or destroy
@@ -85,7 +85,7 @@ class Reader : public ReaderBase {
                    }) {}
 };
 
-/// Keeps samples until somebody takes them. When full the oldest one goes and
+/// An Inbox keeps samples until somebody takes them. When it is full the oldest one goes and
 /// is counted; capacity 1 keeps the newest.
 ///
 /// Threads  safe from any thread.
@@ -98,7 +98,7 @@ class Inbox {
                   put(sample, origin.participant);
                 })) {}
 
-  /// The oldest sample; waits for one until the deadline or a stop request.
+  /// Takes the oldest sample; waits for one until the deadline or a stop request.
   std::optional<T> take(TimePoint deadline, std::stop_token stop = {}) {
     std::unique_lock lock(mutex_);
     if (!arrived_.wait_until(lock, stop, deadline, [&] { return !samples_.empty(); })) return {};
@@ -107,14 +107,14 @@ class Inbox {
     return sample;
   }
 
-  /// Participant::id() of who wrote the newest sample that arrived, taken or not; nothing
+  /// Returns Participant::id() of who wrote the newest sample that arrived, taken or not; nothing
   /// before the first.
   std::optional<std::uint64_t> last_writer() const {
     const std::lock_guard lock(mutex_);
     return last_writer_;
   }
 
-  /// Everything that is there, oldest first, without waiting.
+  /// Takes everything that is there, oldest first, without waiting.
   std::deque<T> take_all() {
     const std::lock_guard lock(mutex_);
     return std::exchange(samples_, {});

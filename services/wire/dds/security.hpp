@@ -9,7 +9,7 @@
 
 namespace jostle::wire {
 
-/// Makes participants of this QoS protected, as the identity in that folder. Errors of
+/// Makes participants of this QoS protected, with the identity in `folder`. Errors are those of
 /// open_identity(); the QoS is then as it was.
 Result<void> secure(eprosima::fastdds::dds::DomainParticipantQos& qos, const std::filesystem::path& folder);
 

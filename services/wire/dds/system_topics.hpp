@@ -14,7 +14,8 @@ struct SystemTopic : RawTopic {
   Scope scope = Scope::kRobot;
 };
 
-/// Those of topics.hpp, in its order, named as without a namespace; topics of single workers are not among them.
+/// Returns the topics of topics.hpp, in its order, by their names without a namespace. Topics of single workers are
+/// not among them.
 const std::vector<SystemTopic>& system_topics();
 
 }  // namespace jostle::wire

@@ -46,8 +46,8 @@ JOSTLE_WIRE_TYPE(jostle_msgs, PlayStatus)
 
 #undef JOSTLE_WIRE_TYPE
 
-/// The generated code lets allocation failures through; the middleware's
-/// threads must not see them.
+/// A Serializer keeps allocation failures from the middleware's threads, which must not see them: the generated
+/// code lets them through.
 template <class T>
 class Serializer final : public SerializerOf<T>::type {
  public:

@@ -7,12 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "idl/types/time.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/topic.hpp"
 
 namespace jostle::wire {
-
-using TimePoint = std::chrono::steady_clock::time_point;
 
 /// Everything about a writer that does not depend on its type.
 ///
@@ -27,16 +26,16 @@ class WriterBase {
   WriterBase(WriterBase&&) noexcept;
   WriterBase& operator=(WriterBase&&) noexcept;
 
-  /// Readers found so far, and gone ones not counted.
+  /// Returns the number of readers that were found and have not gone.
   int matched() const;
 
   /// Whether `count` readers were found by the deadline.
   bool wait_for_readers(TimePoint deadline, int count = 1) const;
 
-  /// Participant::id() of every one that has a reader of ours; each once.
+  /// Returns Participant::id() of every participant that has a reader of ours; each once.
   std::vector<std::uint64_t> matched_participants() const;
 
-  /// Whether that participant has a reader of ours. Others (recorders, `ros2 topic echo`)
+  /// Whether that participant has a reader of ours. Other readers (recorders, `ros2 topic echo`)
   /// are no sign that whoever is to answer hears us.
   bool reaches(std::uint64_t participant) const;
 
@@ -65,7 +64,7 @@ class Writer : public WriterBase {
   /// Sends from the calling thread, tens of microseconds for small messages.
   /// Without readers it succeeds. False: the message is lost, because the middleware had no
   /// room (more keys than the topic's Qos allows, or a profile that keeps all for a reader
-  /// that does not keep up). Who can do without it says so with (void), and why.
+  /// that does not keep up). A caller that can do without it says so with (void), and why.
   [[nodiscard]] bool write(const T& message) { return write_sample(&message); }
 };
 

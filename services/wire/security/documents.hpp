@@ -14,7 +14,7 @@
 
 namespace jostle::wire {
 
-/// Of all domains and topics: strangers are refused, everything is encrypted.
+/// Returns the governance of all domains and topics: strangers are refused, everything is encrypted.
 ///
 /// Source  OMG DDS Security 1.1, 9.4.1.2. Per message: rtps SIGN authenticates the
 ///         whole packet; metadata ENCRYPT hides sequence numbers and headers of
@@ -38,7 +38,7 @@ Result<void> check_governance(const std::filesystem::path& file, const std::stri
 /// Whether Fast DDS takes two subjects for the same: equal parts in equal order,
 /// whatever blanks are around them.
 bool same_subject(const std::string& a, const std::string& b);
-/// The same parts, in whatever order.
+/// Whether two subjects have the same parts, in whatever order.
 bool same_parts(const std::string& a, const std::string& b);
 
 }  // namespace jostle::wire

@@ -20,7 +20,7 @@ struct Identity {
   std::string subject;  ///< RFC 2253, such as CN=arm,OU=robot,O=Jostle
   Role role = Role::kServer;
   Rights rights;         ///< what its permissions say, whatever the role
-  SystemTime not_after;  ///< of certificate and permissions
+  SystemTime not_after;  ///< end of certificate and permissions
   /// DDS Security properties, name and value, that a participant is made with.
   std::vector<std::pair<std::string, std::string>> properties;
 };

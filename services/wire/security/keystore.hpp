@@ -30,37 +30,37 @@
 ///          kInternal         libcrypto failed
 namespace jostle::wire::keystore {
 
-/// Of the whole keystore, and the most that an identity can have.
+/// How long a keystore is good for, and the most that an identity can have.
 inline constexpr std::chrono::days kLifetime{3650};
 
 /// Makes the folder and an authority. kInvalidArgument if something is there already.
 Result<void> create(const std::filesystem::path& folder);
 
-/// Makes an identity, valid from yesterday for so many days from now; gives its folder.
+/// Makes an identity, valid from yesterday for so many days from now; returns its folder.
 /// Fewer than one day gives one that has expired, for tests. A name may be issued
 /// again once its certificate expired or was revoked; kInvalidArgument before.
 Result<std::filesystem::path> issue(const std::filesystem::path& folder, const std::string& name, Role role,
                                     std::chrono::days validity);
 
 /// Puts every certificate of that name on the revocation list, and the new list into
-/// every identity of this keystore; gives the files. Copies on other hosts are others'
-/// business. Running processes go by the list they read when they started.
+/// every identity of this keystore; returns the files. Copies on other hosts stay as they are.
+/// Running processes go by the list they read when they started.
 Result<std::vector<std::filesystem::path>> revoke(const std::filesystem::path& folder, const std::string& name);
 
 enum class State { kValid, kExpired, kRevoked };
 
-/// "valid", "expired" or "revoked".
+/// Returns "valid", "expired" or "revoked".
 std::string to_string(State state);
 
 struct Entry {
   std::string name;
   Role role = Role::kServer;
-  std::string serial;  ///< of the certificate, hexadecimal
+  std::string serial;  ///< the certificate's, hexadecimal
   SystemTime not_after;
   State state = State::kValid;
 };
 
-/// All that was ever issued, oldest first.
+/// Lists all that was ever issued, oldest first.
 Result<std::vector<Entry>> list(const std::filesystem::path& folder, SystemTime now = std::chrono::system_clock::now());
 
 }  // namespace jostle::wire::keystore

@@ -17,7 +17,7 @@
 
 namespace jostle::wire {
 
-/// libcrypto refused what it never refuses: no memory, no randomness.
+/// Thrown if libcrypto refuses what it never refuses: no memory, no randomness.
 struct CryptoError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -68,7 +68,7 @@ Certificate make_certificate(const Authority& authority, EVP_PKEY& holder, const
                              const std::string& serial, const Period& period);
 RevocationList make_revocation_list(const Authority& authority, const std::vector<Revocation>& revoked,
                                     const Period& period);
-/// S/MIME with the text in the clear (`openssl smime -sign -text`), which is how Fast DDS reads it.
+/// Signs a text as S/MIME with the text in the clear (`openssl smime -sign -text`), which is how Fast DDS reads it.
 std::string sign_text(X509& signer, EVP_PKEY& key, const std::string& text);
 
 std::string to_pem(X509& certificate);
@@ -77,23 +77,23 @@ std::string to_pem(X509_CRL& list);
 
 // Reading. Errors name the file, what was got, what was wanted.
 
-/// kNotFound: missing; kIo: there, yet cannot be read.
+/// Reads a whole file. Errors kNotFound: it is missing; kIo: it is there, yet cannot be read.
 Result<std::string> read_file(const std::filesystem::path& file);
 Result<Certificate> load_certificate(const std::filesystem::path& file);
 Result<Key> load_key(const std::filesystem::path& file);
 Result<RevocationList> load_revocation_list(const std::filesystem::path& file);
-/// The text, if the authority itself signed it.
+/// Reads the text, if the authority itself signed it.
 Result<std::string> load_signed_text(const std::filesystem::path& file, X509& authority);
 
-/// The certificate's holder as permissions must name it: RFC 2253, last part first.
+/// Writes a certificate's holder as permissions must name it: RFC 2253, last part first.
 std::string name_of(const X509_NAME* name);
-/// One part, such as NID_commonName; empty if it has none.
+/// Returns one part of a name, such as NID_commonName; empty if it has none.
 std::string part_of(const X509_NAME* name, int nid);
 std::string serial_of(const X509& certificate);
 std::time_t time_of(const ASN1_TIME* time);
 Period period_of(const X509& certificate);
 
-/// "2027-11-25 07:50 UTC"
+/// Writes "2027-11-25 07:50 UTC".
 std::string date_text(std::time_t time);
 
 }  // namespace jostle::wire

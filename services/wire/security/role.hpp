@@ -26,7 +26,7 @@ struct Rights {
 
 Rights rights_of(Role role);
 
-/// "robot", "worker", "observer" or "server".
+/// Returns "robot", "worker", "observer" or "server".
 std::string to_string(Role role);
 std::optional<Role> parse_role(std::string_view word);
 

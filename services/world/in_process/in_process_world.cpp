@@ -27,14 +27,15 @@ Result<robot_bridge::RobotReading> SimulatedRobot::read() {
   const State& x = world_.state();
   const physics_pool::TaskGeometry& geometry = world_.world().geometry();
   const int joints = geometry.layout.robot_joints();
-  return robot_bridge::RobotReading{
-      .q = {x.q.begin(), x.q.begin() + joints},
-      .v = {x.v.begin(), x.v.begin() + joints},
-      .object_in_hand = physics_pool::object_in_hand(geometry, x)};
+  return robot_bridge::RobotReading{.q = {x.q.begin(), x.q.begin() + joints},
+                                    .v = {x.v.begin(), x.v.begin() + joints},
+                                    .object_in_hand = physics_pool::object_in_hand(geometry, x)};
 }
 
 Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {
-  if (auto ok = robot_bridge::check_command(u, physics_pool::axis_limits(world_.world().scene().robot.model), duration); !ok) return ok;
+  if (auto ok = robot_bridge::check_command(u, physics_pool::axis_limits(world_.world().scene().robot.model), duration);
+      !ok)
+    return ok;
   world_.begin(u);
   const long steps = std::lround(duration / world_.world().time_step());
   for (long i = 0; i < steps; ++i) {

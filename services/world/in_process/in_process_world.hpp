@@ -11,7 +11,7 @@
 
 namespace jostle::world {
 
-/// Object readings from a full state.
+/// Makes object readings from a full state.
 std::vector<perception::ObjectReading> object_readings(const StateLayout& layout, const State& x);
 
 /// Moves an execution world by commands. Time stands still between actions, as

@@ -27,17 +27,17 @@ jostle_msgs::msg::ObjectStates to_message(const std::vector<perception::ObjectRe
 /// Error kInvalidArgument naming the field that is not finite or no rotation.
 Result<std::vector<perception::ObjectReading>> from_message(const jostle_msgs::msg::ObjectStates& message);
 
-/// Standard forms of the same, for ROS 2 tools.
+/// These are standard forms of the same, for ROS 2 tools.
 sensor_msgs::msg::JointState joint_state_message(const StateLayout& layout, const State& x, double time);
 geometry_msgs::msg::PoseArray pose_array_message(const jostle_msgs::msg::ObjectStates& objects);
 tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates& objects);
 
-/// Ends the command at work, and those of its commander that wait (robot.idl).
+/// Makes the message that ends the command at work, and those of its commander that wait (robot.idl).
 jostle_msgs::msg::VelocityCommand stop_message(std::uint64_t epoch, std::uint64_t sequence_number);
 bool is_stop(const jostle_msgs::msg::VelocityCommand& command);
 
-/// `in_hand` of a status or an observation, one of RobotStatus_Constants. A number that is none of
-/// them says nothing about the hand.
+/// Converts to and from `in_hand` of a status or an observation, one of RobotStatus_Constants. A number that
+/// is none of them says nothing about the hand.
 std::uint8_t in_hand_message(std::optional<bool> object_in_hand);
 std::optional<bool> in_hand_from(std::uint8_t in_hand);
 
@@ -50,7 +50,7 @@ struct Seen {
   std::vector<perception::ObjectReading> objects;
 };
 
-/// Goal, number and command are left to the caller.
+/// Makes an observation; its goal, number and command are left to the caller.
 jostle_msgs::msg::Observation to_message(const Seen& seen, double time);
 /// Error kInvalidArgument naming the field.
 Result<Seen> from_message(const jostle_msgs::msg::Observation& message);

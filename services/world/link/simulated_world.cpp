@@ -80,8 +80,7 @@ void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
     publish();
     return;
   }
-  const auto check_result =
-      robot_bridge::check_command(command.velocities(), limits_, command.duration());
+  const auto check_result = robot_bridge::check_command(command.velocities(), limits_, command.duration());
   if (!check_result && command.epoch() > epoch_) {  // the present commander must not suffer for it
     spdlog::warn("command {}/{} of a newcomer: {}; refused", command.epoch(), command.sequence_number(),
                  check_result.error().message);

@@ -18,7 +18,7 @@ namespace jostle::world {
 
 struct SimulatedWorldOptions {
   physics_pool::VelocityNoise noise;
-  /// The planner's scene, which the objects' first measurement agrees with, and whose heights it goes on believing.
+  /// The planner's scene. The objects' first measurement agrees with it, and all later ones keep its heights.
   physics_pool::Scene belief;
   /// World seconds per second while an action runs; 0 is as fast as possible.
   double rate = 0.0;
@@ -40,7 +40,7 @@ class SimulatedWorld {
   SimulatedWorld(const wire::Participant& participant, physics_pool::WorldPtr world,
                  const SimulatedWorldOptions& options);
 
-  /// Until a stop is requested. Error kInternal if the physics diverged; it is
+  /// Runs until a stop is requested. Error kInternal if the physics diverged; it is
   /// also published.
   Result<void> run(std::stop_token stop);
 
@@ -61,7 +61,7 @@ class SimulatedWorld {
 
   SimulatedWorldOptions options_;
   physics_pool::ExecutionWorld world_;
-  std::vector<double> limits_;                             // of the axes, m/s or rad/s
+  std::vector<double> limits_;                             // largest speeds of the axes, m/s or rad/s
   std::vector<double> still_;                              // the control that moves nothing
   std::deque<jostle_msgs::msg::VelocityCommand> waiting_;  // came while an action was at work
   std::deque<Action> actions_;

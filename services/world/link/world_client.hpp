@@ -28,7 +28,7 @@ struct WorldClientOptions {
 /// Commands go to `rt/robot/command`; `rt/robot/status` tells when one is done. A stop
 /// request is passed on, and answered with kCancelled once the robot says that it obeyed.
 /// Bad statuses are counted, reported and skipped; only if nothing good follows
-/// are they an error. So is a commander with a newer epoch, whom the robot obeys.
+/// are they an error. A commander with a newer epoch, whom the robot obeys, is an error, too.
 class RobotClient final : public robot_bridge::Robot {
  public:
   RobotClient(const wire::Participant& participant, const WorldClientOptions& options = {});
@@ -36,20 +36,20 @@ class RobotClient final : public robot_bridge::Robot {
   Result<robot_bridge::RobotReading> read() override;
   Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override;
 
-  /// Time stamp of the newest status, s of the world's clock.
+  /// Returns the time stamp of the newest status, s of the world's clock.
   double time() const { return time_; }
 
  private:
-  /// The next good one.
+  /// Waits for the next good status.
   Result<jostle_msgs::msg::RobotStatus> next_status(std::stop_token stop);
 
-  /// Until whoever sends the statuses reads our commands. Anybody else may read them too.
+  /// Waits until the sender of the statuses reads our commands. It does not count that others read them.
   Result<void> wait_for_robot(std::stop_token stop);
 
-  /// Until the command of sequence_number_ is finished or refused.
+  /// Waits until the command of sequence_number_ is finished or refused.
   Result<void> wait_until_finished(std::stop_token stop);
 
-  /// The robot stands still. Error kUnavailable: it does not say so.
+  /// Makes the robot stand still. Error kUnavailable: it does not say that it does.
   Result<void> halt();
 
   WorldClientOptions options_;
@@ -60,13 +60,13 @@ class RobotClient final : public robot_bridge::Robot {
   std::string refusal_;  // the last one heard; it is repeated until the next good command
   bool heard_ = false;
   std::vector<double> limits_;  // per axis, of the newest status
-  bool known_ = false;      // a status has named our epoch
+  bool known_ = false;          // a status has named our epoch
   double time_ = 0.0;
   std::uint64_t rejected_ = 0;
 };
 
-/// Object states from `rt/objects/states`, never older than the robot's newest
-/// status: what is planned from belongs together. Bad measurements are counted,
+/// Reads object states from `rt/objects/states`, never older than the robot's newest
+/// status, so that both describe one moment. Bad measurements are counted,
 /// reported and skipped; only if nothing good follows are they an error.
 class ObjectsClient final : public perception::ObjectSource {
  public:

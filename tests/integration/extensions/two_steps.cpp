@@ -9,7 +9,7 @@ Result<void> take_two_steps(Execution& execution) {
   if (auto ok = execution.observe(); !ok) return ok;
   ControlSequence still{.nu = execution.layout().nu};
   still.values.assign(2 * static_cast<std::size_t>(still.nu), 0.0);
-  if (auto ok = execution.plan(still, 1); !ok) return ok;
+  if (auto ok = execution.plan(still, 1, execution.objective()); !ok) return ok;
   for (int step = 0; step < 2; ++step) {
     if (auto ok = execution.act(); !ok) return ok;
   }
@@ -22,11 +22,11 @@ const ControllerKind kTwoSteps{
     .purpose = "plans once and acts twice",
     .parameters = "experiments/grasping.yaml",
     .fits = [](const physics_pool::Scene&) { return true; },
-    .run = [](const ControlSetup& setup, const ControllerOptions& options, const OnEvent& on_event,
-              std::stop_token stop) {
-      Execution execution(setup, options.control.step_duration, on_event, std::move(stop));
-      return execution.end(take_two_steps(execution));
-    }};
+    .run =
+        [](const ControlSetup& setup, const ControllerOptions& options, const OnEvent& on_event, std::stop_token stop) {
+          Execution execution(setup, options.control.step_duration, on_event, std::move(stop));
+          return execution.end(take_two_steps(execution));
+        }};
 
 [[maybe_unused]] const bool kAdded = (add_controller(kTwoSteps), true);
 

@@ -9,8 +9,8 @@
 #include "physics_pool/local/engine.hpp"
 #include "physics_pool/local/reduced_simulator.hpp"
 #include "physics_pool/local/simulator.hpp"
-#include "tests/support/scenes.hpp"
 #include "tests/support/costs.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace {
 
@@ -113,8 +113,8 @@ TEST_F(AllocationTest, ScoringAStepAllocatesNothing) {
   const std::array<double, 4> u{0.1, 0, 0, 0}, none{};
   const Objective objective = Objective::standard();
   const long before = allocations;
-  const double cost = tests::running_cost(geometry, objective, none, u, a, b) + tests::goal_cost(geometry, b, objective.value("goal", "angle")) +
-                      at_goal(geometry, b, objective);
+  const double cost = tests::running_cost(geometry, objective, none, u, a, b) +
+                      tests::goal_cost(geometry, b, objective.value("goal", "angle")) + at_goal(geometry, b, objective);
   EXPECT_EQ(allocations, before);
   EXPECT_GT(cost, 0.0);
 }

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "tests/support/scenes.hpp"
 #include "tests/support/planar.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -45,7 +45,8 @@ TEST(ExecutionWorld, EndsActionsBitEqualToThePlannersModelWithoutNoise) {
 TEST(ExecutionWorld, RepeatsForEqualSeedsAndDiffersForOthers) {
   const WorldPtr world = compiled();
   const std::vector<double> u{0.1, 0.1, 0.3, 0};
-  ExecutionWorld a(world, {.sigma = 0.003, .seed = 1}), b(world, {.sigma = 0.003, .seed = 1}), c(world, {.sigma = 0.003, .seed = 2});
+  ExecutionWorld a(world, {.sigma = 0.003, .seed = 1}), b(world, {.sigma = 0.003, .seed = 1}),
+      c(world, {.sigma = 0.003, .seed = 2});
   const State x = after(a, u);
   EXPECT_EQ(after(b, u), x);
   EXPECT_NE(after(c, u), x);
@@ -67,16 +68,64 @@ TEST(ExecutionWorld, AddsVelocityNoiseOfTheGivenSigmaEveryStep) {
   EXPECT_NEAR(std::sqrt(square / kRuns) / kSigma, 1.0, 5 / std::sqrt(2.0 * kRuns));
 }
 
+// Eq. 5.10, read as a standard deviation: 0.5·|u| with a hand that turns at 0.3 rad/s counted as 0.03 m/s.
+TEST(ExecutionWorld, AddsVelocityNoiseInProportionToTheControl) {
+  Scene scene = tests::target_only();
+  scene.robot = physics_pool::planar_gripper({.x = -0.8});
+  const WorldPtr world = std::move(World::compile(scene)).value();
+  constexpr int kRuns = 400;
+  const std::vector<double> u{0.04, 0, 0.3, 0};
+  ExecutionWorld quiet(world);
+  const double without = after(quiet, u, 1).v[kJointY];
+  double square = 0;
+  for (std::uint64_t seed = 0; seed < kRuns; ++seed) {
+    ExecutionWorld sut(world, {.slope = 0.5, .seed = seed});
+    square += std::pow(after(sut, u, 1).v[kJointY] - without, 2);
+  }
+  EXPECT_NEAR(std::sqrt(square / kRuns) / (0.5 * 0.05), 1.0, 5 / std::sqrt(2.0 * kRuns));
+}
+
+// Both are N(0, s^2) after every step of the same physics; the numbers are others, or a planner would foretell the
+// world.
+TEST(ExecutionWorld, AndThePlannersModelAreDisturbedAlikeByOtherNumbers) {
+  const WorldPtr world = compiled();
+  const VelocityNoise noise{.sigma = 0.003, .seed = 1};
+  ExecutionWorld sut(world, noise);
+  Simulator model(world);
+  State x = initial_state(world->scene());
+  const std::vector<double> u{0.1, 0.1, 0.3, 0};
+  (void)model.advance(x, u, kSteps, {}, {.noise = noise, .stream = {.purpose = Purpose::kExecutedNoise}});
+  EXPECT_EQ(after(sut, u), x);
+  State y = initial_state(world->scene());
+  (void)model.advance(y, u, kSteps, {}, {.noise = noise});
+  EXPECT_NE(y, x);
+}
+
+// A rollout may be cut at any control step and go on elsewhere.
+TEST(Disturbance, IsDrawnByTheStepOfTheWholeRollout) {
+  const WorldPtr world = compiled();
+  const VelocityNoise noise{.sigma = 0.003, .seed = 1};
+  const std::vector<double> u{0.1, 0.1, 0.3, 0};
+  Simulator whole(world), cut(world);
+  State x = initial_state(world->scene()), y = x;
+  (void)whole.advance(x, u, kSteps, {}, {.noise = noise});
+  (void)whole.advance(x, u, kSteps, {}, {.noise = noise, .first_step = kSteps});
+  (void)cut.advance(y, u, kSteps, {}, {.noise = noise});
+  Simulator elsewhere(world);
+  (void)elsewhere.advance(y, u, kSteps, {}, {.noise = noise, .first_step = kSteps});
+  EXPECT_EQ(x, y);
+}
+
 TEST(ExecutionWorld, StaysNearTheQuietWorldWhenNoiseIsSmall) {
   const WorldPtr world = compiled();
-  ExecutionWorld quiet(world), noisy(world, 1e-6, 1);
+  ExecutionWorld quiet(world), noisy(world, {.sigma = 1e-6, .seed = 1});
   const State a = after(quiet, {0, 0, 0, 0}), b = after(noisy, {0, 0, 0, 0});
   EXPECT_NE(a, b);
   for (std::size_t i = 0; i < a.q.size(); ++i) EXPECT_NEAR(a.q[i], b.q[i], 1e-4);
 }
 
 TEST(ExecutionWorld, ReportsDivergenceAsAnError) {
-  ExecutionWorld sut(compiled(), 1e12, 1);
+  ExecutionWorld sut(compiled(), {.sigma = 1e12, .seed = 1});
   sut.begin(std::vector<double>{0, 0, 0, 0});
   Result<void> ok;
   for (int i = 0; i < 5 && ok; ++i) ok = sut.step();

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <sched.h>
 
+#include <cstddef>
 #include <future>
+#include <memory>
 #include <system_error>
 
 #include "tests/support/batches.hpp"
@@ -52,6 +54,31 @@ TEST(Executor, ThreadsStayOnTheirCores) {
   sut.submit(run, 0);
 
   EXPECT_EQ(told.get_future().get(), std::pair(1, true));
+}
+
+// Planning in several worlds in turn must not make simulators all the time.
+TEST(Executor, KeepsSimulatorsWithinItsMemory) {
+  const auto run_all = [](std::size_t bytes) {
+    std::vector<WorldPtr> worlds;
+    std::size_t size = 0;
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) worlds.push_back(World::compile(small_scene(seed)).value());
+    Executor sut(1, {}, bytes);
+    for (int round = 0; round < 2; ++round) {
+      for (const WorldPtr& world : worlds) {
+        const auto run = std::make_shared<BatchRun>();
+        run->batch = push_batch(world->scene(), 1);
+        run->world = world;
+        std::promise<void> done;
+        run->on_outcome = [&](const RolloutOutcome&, const Shift&) { done.set_value(); };
+        sut.submit(run, 0);
+        done.get_future().get();
+      }
+    }
+    for (const WorldPtr& world : worlds) size += world.use_count() > 1 ? 1 : 0;  // some simulator has it still
+    return size;
+  };
+  EXPECT_EQ(run_all(std::size_t{1} << 30), 6u);
+  EXPECT_EQ(run_all(1), 1u);
 }
 
 TEST(Executor, CoreThatIsNotThereIsAnError) { EXPECT_THROW(Executor(1, {CPU_SETSIZE - 1}), std::system_error); }

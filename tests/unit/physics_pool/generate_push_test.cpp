@@ -64,7 +64,8 @@ TEST_P(GeneratePush, GivesValidScenesThatReadBack) {
 TEST_P(GeneratePush, PutsThePusherStraightBehindTheTarget) {
   for (const Scene& scene : all_chapter6()) {
     const SceneObject& target = target_of(scene);
-    const double gap = signed_distance(target, {.x = scene.robot.q[0], .y = scene.robot.q[1], .radius = *disc_radius(scene.robot.model)});
+    const double gap = signed_distance(
+        target, {.x = scene.robot.q[0], .y = scene.robot.q[1], .radius = *disc_radius(scene.robot.model)});
     EXPECT_GE(gap, 0.01 - 1e-6);
     EXPECT_LE(gap, 0.02 + 1e-6);
     EXPECT_NEAR(off_the_way(scene, scene.robot.q[0], scene.robot.q[1]), 0.0, 1e-12);

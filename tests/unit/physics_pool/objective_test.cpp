@@ -8,9 +8,9 @@
 #include <numbers>
 
 #include "physics_pool/sampling/counter_rng.hpp"
-#include "tests/support/scenes.hpp"
-#include "tests/support/planar.hpp"
 #include "tests/support/costs.hpp"
+#include "tests/support/planar.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -69,7 +69,8 @@ TEST_F(ObjectiveTerms, GoalDistanceAndAngleFollowTheHand) {
       const TargetBearing bearing = target_bearing(geometry, start);
       EXPECT_NEAR(bearing.distance, 0.05, 1e-12);
       EXPECT_NEAR(bearing.angle, std::atan2(0.03, 0.04), 1e-9);
-      EXPECT_NEAR(tests::goal_cost(geometry, start, 2.0), 0.05 * 0.05 + 2.0 * std::pow(std::atan2(0.03, 0.04), 2), 1e-9);
+      EXPECT_NEAR(tests::goal_cost(geometry, start, 2.0), 0.05 * 0.05 + 2.0 * std::pow(std::atan2(0.03, 0.04), 2),
+                  1e-9);
     }
   }
 }
@@ -167,9 +168,11 @@ TEST_F(ObjectiveTerms, EdgeCostGrowsExponentiallyOutsideTheSafeZone) {
 TEST_F(ObjectiveTerms, EdgeCostIsCapped) {
   State after = start;
   place(after, 1, 0.29, 0);
-  EXPECT_DOUBLE_EQ(tests::edge_cost(geometry, start, after, objective), std::exp(objective.value("edge", "exponent_max")));
+  EXPECT_DOUBLE_EQ(tests::edge_cost(geometry, start, after, objective),
+                   std::exp(objective.value("edge", "exponent_max")));
   place(after, 2, 0, 5.0);  // far off the table, and still finite
-  EXPECT_DOUBLE_EQ(tests::edge_cost(geometry, start, after, objective), 2 * std::exp(objective.value("edge", "exponent_max")));
+  EXPECT_DOUBLE_EQ(tests::edge_cost(geometry, start, after, objective),
+                   2 * std::exp(objective.value("edge", "exponent_max")));
 }
 
 TEST_F(ObjectiveTerms, EdgeCostCountsTheTargetToo) {
@@ -278,7 +281,17 @@ TEST_F(ObjectiveTerms, ObstructionsAreOtherObjectsBetweenTheFingers) {
 }
 
 TEST_F(ObjectiveTerms, RunningCostIsTheWeightedSum) {
-  const Objective weights = objective_with({{"acceleration", 3}, {"disturbance", 5}, {"disturbance_rotation", 0}, {"edge", 7}, {"edge_rate", 10}, {"edge_exponent_max", 50}, {"edge_margin", 0.05}, {"topple", 11}, {"topple_angle", 0.5}, {"drop", 13}, {"drop_height", 0.02}});
+  const Objective weights = objective_with({{"acceleration", 3},
+                                            {"disturbance", 5},
+                                            {"disturbance_rotation", 0},
+                                            {"edge", 7},
+                                            {"edge_rate", 10},
+                                            {"edge_exponent_max", 50},
+                                            {"edge_margin", 0.05},
+                                            {"topple", 11},
+                                            {"topple_angle", 0.5},
+                                            {"drop", 13},
+                                            {"drop_height", 0.02}});
   State after = start;
   place(after, 1, 0.29, start.q[5 + 7 + 1]);  // from x = 0.05: 24 cm
   turn(after, 2, 1.0, 1, 0, 0);
@@ -304,9 +317,11 @@ TEST_F(ObjectiveTerms, AreNeverNegativeOrInfiniteForRandomStates) {
     const std::vector<double> u0{random.normal(0, 1), random.normal(0, 1), random.normal(0, 1), random.normal(0, 1)};
     const std::vector<double> u1{random.normal(0, 1), random.normal(0, 1), random.normal(0, 1), random.normal(0, 1)};
     for (const double cost :
-         {tests::goal_cost(geometry, b, objective.value("goal", "angle")), acceleration_cost(u0, u1), disturbance_cost(geometry, a, b, 1.0),
-          tests::edge_cost(geometry, a, b, objective), double(toppled_objects(geometry, b, objective.value("topple", "angle"))),
-          double(count_dropped(geometry, b, objective.value("drop", "height"))), tests::running_cost(geometry, objective, u0, u1, a, b)}) {
+         {tests::goal_cost(geometry, b, objective.value("goal", "angle")), acceleration_cost(u0, u1),
+          disturbance_cost(geometry, a, b, 1.0), tests::edge_cost(geometry, a, b, objective),
+          double(toppled_objects(geometry, b, objective.value("topple", "angle"))),
+          double(count_dropped(geometry, b, objective.value("drop", "height"))),
+          tests::running_cost(geometry, objective, u0, u1, a, b)}) {
       ASSERT_GE(cost, 0.0);
       ASSERT_TRUE(std::isfinite(cost));
     }
@@ -351,7 +366,8 @@ TEST(ValidateObjective, NamesWhatIsWrong) {
   EXPECT_THAT(told([](Objective& o) { o.terms.push_back({.kind = "charm"}); }),
               testing::AllOf(testing::HasSubstr("got 'charm'"), testing::HasSubstr("obstruction")));
   EXPECT_THAT(told([](Objective& o) { o.terms.push_back(o.terms[0]); }), testing::HasSubstr("it twice"));
-  EXPECT_THAT(told([](Objective& o) { o["edge"].values.pop_back(); }), testing::HasSubstr("got 2 parameters, wanted 3"));
+  EXPECT_THAT(told([](Objective& o) { o["edge"].values.pop_back(); }),
+              testing::HasSubstr("got 2 parameters, wanted 3"));
   EXPECT_THAT(told([](Objective& o) { o.value("topple", "angle") = 4; }),
               testing::AllOf(testing::HasSubstr("objective.topple_angle: got 4 rad"), testing::HasSubstr("<= 3.142")));
 }

@@ -6,8 +6,8 @@
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/parareal/parareal_pool.hpp"
 #include "tests/support/batches.hpp"
-#include "tests/support/pushing.hpp"
 #include "tests/support/planar.hpp"
+#include "tests/support/pushing.hpp"
 
 namespace jostle::tests {
 namespace {

@@ -8,9 +8,9 @@
 #include "physics_pool/objective/bound.hpp"
 #include "physics_pool/objective/terms.hpp"
 #include "physics_pool/sampling/counter_rng.hpp"
-#include "tests/support/scenes.hpp"
-#include "tests/support/planar.hpp"
 #include "tests/support/costs.hpp"
+#include "tests/support/planar.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -111,7 +111,8 @@ TEST_F(PushTerms, CollisionsCountTargetAndPusher) {
   EXPECT_EQ(count_collisions(geometry, start), 1);
   start.q[kJointX] = -0.02;
   EXPECT_EQ(count_collisions(geometry, start), 2);
-  const Objective weights = objective_with({{"acceleration", 0}, {"disturbance", 0}, {"obstacle_target", 0}, {"obstacle_pusher", 0}, {"collision", 7}});
+  const Objective weights = objective_with(
+      {{"acceleration", 0}, {"disturbance", 0}, {"obstacle_target", 0}, {"obstacle_pusher", 0}, {"collision", 7}});
   const std::vector<double> u{0, 0};
   EXPECT_EQ(tests::running_cost(geometry, weights, u, u, start, start), 14.0);
 }
@@ -136,7 +137,14 @@ TEST_F(PushTerms, AtGoalIsTheTargetsCentreInsideTheRegion) {
 }
 
 TEST_F(PushTerms, RunningCostIsTheWeightedSum) {
-  const Objective weights = objective_with({{"acceleration", 3}, {"disturbance", 5}, {"edge", 7}, {"edge_margin", 0.05}, {"drop", 13}, {"obstacle_target", 17}, {"obstacle_pusher", 19}, {"intrusion", 23}});
+  const Objective weights = objective_with({{"acceleration", 3},
+                                            {"disturbance", 5},
+                                            {"edge", 7},
+                                            {"edge_margin", 0.05},
+                                            {"drop", 13},
+                                            {"obstacle_target", 17},
+                                            {"obstacle_pusher", 19},
+                                            {"intrusion", 23}});
   State after = start;
   place(after, 0, 0.0, 0.2);
   place(after, 1, 0.2, 0.0);  // from (0, 0.25)
@@ -160,8 +168,9 @@ TEST_F(PushTerms, AreNeverNegativeOrInfiniteForRandomStates) {
     }
     const std::vector<double> u0{random.normal(0, 1), random.normal(0, 1)},
         u1{random.normal(0, 1), random.normal(0, 1)};
-    for (const double cost : {tests::running_cost(geometry, objective, u0, u1, a, b), tests::final_cost(geometry, objective, b),
-                              tests::obstacle_cost(geometry, b, objective)}) {
+    for (const double cost :
+         {tests::running_cost(geometry, objective, u0, u1, a, b), tests::final_cost(geometry, objective, b),
+          tests::obstacle_cost(geometry, b, objective)}) {
       ASSERT_GE(cost, 0.0);
       ASSERT_TRUE(std::isfinite(cost));
     }

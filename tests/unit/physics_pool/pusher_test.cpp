@@ -6,8 +6,8 @@
 
 #include "physics_pool/local/simulator.hpp"
 #include "physics_pool/scenarios/push.hpp"
-#include "tests/support/scenes.hpp"
 #include "tests/support/planar.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {
 namespace {

@@ -5,8 +5,8 @@
 #include <numeric>
 
 #include "physics_pool/local/simulator.hpp"
-#include "tests/support/scenes.hpp"
 #include "tests/support/costs.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -65,7 +65,9 @@ TEST_F(RolloutTest, FollowsFAndScoresEveryStep) {
     (void)sut->advance(x, controls.step(t), 200);
     EXPECT_EQ(outcome.trajectory[std::size_t(t) + 1], x);
     double cost = tests::running_cost(world->geometry(), batch.objective, u_before, controls.step(t), before, x);
-    if (t == 3) cost += batch.objective.weight("goal") * tests::goal_cost(world->geometry(), x, batch.objective.value("goal", "angle"));
+    if (t == 3)
+      cost += batch.objective.weight("goal") *
+              tests::goal_cost(world->geometry(), x, batch.objective.value("goal", "angle"));
     EXPECT_DOUBLE_EQ(outcome.step_costs[std::size_t(t)], cost);
     total += cost;
     u_before.assign(controls.step(t).begin(), controls.step(t).end());

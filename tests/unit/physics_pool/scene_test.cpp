@@ -241,8 +241,8 @@ TEST(OverlapsRobot, LeavesTheSpaceBetweenTheFingersFree) {
   EXPECT_FALSE(overlaps_robot(scene, tests::box("b", kHand.depth, 0)));
   EXPECT_TRUE(overlaps_robot(scene, tests::box("b", kHand.depth, 0.03)));   // left finger
   EXPECT_TRUE(overlaps_robot(scene, tests::box("b", kHand.depth, -0.03)));  // right finger
-  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", -0.05, 0)));                  // palm
-  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", -0.25, 0)));                  // arm
+  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", -0.05, 0)));            // palm
+  EXPECT_TRUE(overlaps_robot(scene, tests::box("b", -0.25, 0)));            // arm
   EXPECT_FALSE(overlaps_robot(scene, tests::box("b", kHand.finger_length + 0.021, 0.05)));
 }
 

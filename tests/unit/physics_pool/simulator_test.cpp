@@ -9,8 +9,8 @@
 #include <filesystem>
 
 #include "physics_pool/scenarios/chapter3.hpp"
-#include "tests/support/scenes.hpp"
 #include "tests/support/planar.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::physics_pool {
 namespace {

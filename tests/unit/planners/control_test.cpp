@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "tests/support/kinematic_world.hpp"
-#include "tests/support/scenes.hpp"
 #include "tests/support/planar.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::planners {
 namespace {
@@ -50,7 +50,7 @@ class ControllerTest : public testing::Test {
                      .robot = robot,
                      .objects = objects,
                      .geometry = geometry,
-                     .objective = {},
+                     .objective = physics_pool::Objective::standard(),
                      .world = hash_of("world"),
                      .seed = 11,
                      .make_feasible = {}};
@@ -345,7 +345,7 @@ TEST_F(OnlineReplanning, DemandsAClearHandOnlyAfterPatienceAndWithSomethingInIt)
   });
   (void)outcome();
   std::vector<bool> clear;
-  for (const Problem& problem : planner.problems) clear.push_back(problem.clear_hand);
+  for (const Problem& problem : planner.problems) clear.push_back(problem.objective.weight("obstruction") > 0);
   EXPECT_THAT(clear, testing::ElementsAre(false, false, false, false, true, true, true));
 }
 

@@ -7,6 +7,7 @@
 #include "physics_pool/objective/scorer.hpp"
 #include "physics_pool/scenarios/push.hpp"
 #include "planners/mpc/mpc.hpp"
+#include "services/task/config/parameters.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 #include "tests/support/scenes.hpp"
 
@@ -18,8 +19,8 @@ using namespace physics_pool;
 Outcome pushed(const Scene& scene, const MpcOptions& options) {
   const WorldPtr world = std::move(World::compile(scene)).value();
   ThreadPool pool(2);
-  const PbstoOptions planner_options = push_planner_options();
-  Pbsto planner(pool, planner_options);
+  const auto parameters = task::load_parameters(std::string(JOSTLE_SOURCE_DIR) + "/experiments/pushing.yaml").value();
+  Pbsto planner(pool, parameters.planner);
   ExecutionWorld truth(world);
   world::SimulatedRobot robot(truth);
   world::SimulatedObjects objects(truth, scene);
@@ -27,7 +28,7 @@ Outcome pushed(const Scene& scene, const MpcOptions& options) {
                            .robot = robot,
                            .objects = objects,
                            .geometry = world->geometry(),
-                           .objective = planner_options.objective,
+                           .objective = parameters.objective,
                            .world = std::move(pool.load(scene)).value(),
                            .seed = 1};
   auto result = run_mpc(setup, options);

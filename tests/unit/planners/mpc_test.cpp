@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "tests/support/kinematic_world.hpp"
-#include "tests/support/scenes.hpp"
 #include "tests/support/planar.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::planners {
 namespace {
@@ -64,7 +64,7 @@ class MpcTest : public testing::Test {
                      .robot = robot,
                      .objects = objects,
                      .geometry = geometry,
-                     .objective = {},
+                     .objective = physics_pool::Objective::standard(),
                      .world = hash_of("world"),
                      .seed = 11,
                      .make_feasible = {}};

@@ -25,7 +25,9 @@ class PbstoTest : public testing::Test {
       news.push_back(progress);
       final_x.push_back(progress.final_state ? progress.final_state->q[0] : std::nan(""));
     });
-    auto plan = sut.plan(p, kNever);
+    Problem asked = p;
+    asked.objective = objective;
+    auto plan = sut.plan(asked, kNever);
     if (!plan) {
       ADD_FAILURE() << plan.error().message;
       return {};
@@ -44,6 +46,7 @@ class PbstoTest : public testing::Test {
 
   BowlPool pool{kWanted};
   PbstoOptions options;
+  physics_pool::Objective objective = physics_pool::Objective::standard();
   std::vector<Progress> news;
   std::vector<double> final_x;
 };
@@ -102,10 +105,10 @@ TEST_P(PbstoUpdate, UsesOneStreamPerIteration) {
 
 TEST_P(PbstoUpdate, StopsAtSuccess) {
   pool.can_succeed = true;
-  options.objective.success_cost = 0.5 * pool.cost(problem(1).initial);
+  objective.success_cost = 0.5 * pool.cost(problem(1).initial);
   const Plan plan = planned(problem(1000));
   EXPECT_TRUE(plan.at_goal);
-  EXPECT_LE(plan.cost, options.objective.success_cost);
+  EXPECT_LE(plan.cost, objective.success_cost);
   EXPECT_LT(plan.iterations, 1000);
   // Every batch but the last was no success.
   for (std::size_t i = 0; i + 1 < news.size(); ++i) EXPECT_FALSE(news[i].at_goal);
@@ -113,7 +116,7 @@ TEST_P(PbstoUpdate, StopsAtSuccess) {
 
 TEST_P(PbstoUpdate, PlansNothingMoreWhenTheInitialControlsSucceed) {
   pool.can_succeed = true;
-  options.objective.success_cost = 1e9;
+  objective.success_cost = 1e9;
   const Plan plan = planned(problem(50));
   EXPECT_TRUE(plan.at_goal);
   EXPECT_EQ(plan.iterations, 0);
@@ -200,7 +203,7 @@ TEST_F(PbstoTest, AsksForWhatItsOptionsSay) {
   options.min_steps = 3;
   options.sigma = {0.01, 0.02, 0.03, 0.04};
   options.limit = {1, 2, 3, 4};
-  options.objective["goal"].weight = 77;
+  objective["goal"].weight = 77;
   (void)planned(problem(1));
   const auto& batch = pool.batches.back();
   EXPECT_EQ(batch.samples, 13u);
@@ -212,14 +215,14 @@ TEST_F(PbstoTest, AsksForWhatItsOptionsSay) {
   EXPECT_TRUE(batch.stop_on_success);
 }
 
-TEST_F(PbstoTest, CountsObstructionsOnlyWhenTheHandMustBeClear) {
-  options.objective["obstruction"].weight = 55;
-  Problem p = problem(1);
-  (void)planned(p);
-  EXPECT_EQ(pool.batches.back().objective.weight("obstruction"), 0.0);
-  p.clear_hand = true;
-  (void)planned(p);
-  EXPECT_EQ(pool.batches.back().objective.weight("obstruction"), 55);
+// No iteration begins once they are spent: 1 + 8 + 8 are not yet 18.
+TEST_F(PbstoTest, BeginsNoIterationOnceItsRolloutsAreSpent) {
+  options.rollouts = 8;
+  Problem p = problem(100);
+  p.rollouts = 18;
+  const Plan plan = planned(p);
+  EXPECT_EQ(plan.iterations, 3);
+  EXPECT_EQ(plan.rollouts, 25u);
 }
 
 TEST_F(PbstoTest, GreedyPicksTheCheapestSample) {
@@ -378,12 +381,12 @@ TEST_F(PbstoTest, TheFirstSuccessOfTheScreeningIsAlwaysRunAgain) {
   pool.can_succeed = true;
   options.rollouts = 1;
   options.screening = 64;
-  options.objective.success_cost = 0.9 * pool.cost(problem(1).initial);
+  objective.success_cost = 0.9 * pool.cost(problem(1).initial);
   planned(problem(1));
   ASSERT_EQ(pool.batches.size(), 3u);
   const auto& coarse = pool.batches[1];
   std::uint32_t first = 0;
-  while (pool.cost(sample_controls(coarse.nominal, coarse.law, first)) > options.objective.success_cost) ++first;
+  while (pool.cost(sample_controls(coarse.nominal, coarse.law, first)) > objective.success_cost) ++first;
   EXPECT_THAT(pool.batches[2].law.draws, testing::ElementsAre(first));
 }
 
@@ -407,7 +410,7 @@ bool is_full(const physics_pool::RolloutBatch& batch) { return batch.fidelity ==
 TEST_F(PbstoTest, SuccessOfReducedPhysicsCountsOnceFullPhysicsAgrees) {
   pool.can_succeed = true;
   options.freeze = true;
-  options.objective.success_cost = 0.5 * pool.cost(problem(1).initial);
+  objective.success_cost = 0.5 * pool.cost(problem(1).initial);
   const Plan plan = planned(problem(50));
   EXPECT_TRUE(plan.at_goal);
   EXPECT_TRUE(is_full(pool.batches.back()));
@@ -420,7 +423,7 @@ TEST_F(PbstoTest, SuccessThatFullPhysicsDeniesIsOneMoreCandidate) {
   pool.can_succeed = true;
   options.freeze = true;
   const double start = pool.cost(problem(1).initial);
-  options.objective.success_cost = 0.5 * start;
+  objective.success_cost = 0.5 * start;
   pool.extra = [=](const auto& batch) { return is_full(batch) ? 10 * start : 0.0; };
   const Plan plan = planned(problem(10));
   EXPECT_FALSE(plan.at_goal);
@@ -436,7 +439,7 @@ TEST_F(PbstoTest, DeniedSuccessDoesNotShortenTheHorizon) {
   pool.success_steps = 2;  // of three
   options.freeze = true;
   const double start = pool.cost(problem(1).initial);
-  options.objective.success_cost = 0.8 * start;
+  objective.success_cost = 0.8 * start;
   pool.extra = [=](const auto& batch) { return is_full(batch) ? 0.1 * start : 0.0; };  // denied, yet cheaper
   const Plan plan = planned(problem(3));
   EXPECT_GT(plan.denials, 0);
@@ -450,13 +453,12 @@ TEST_F(PbstoTest, DeniedSuccessThatIsStillBetterIsKeptAtItsTrueCost) {
   pool.can_succeed = true;
   options.freeze = true;
   const double start = pool.cost(problem(1).initial);
-  options.objective.success_cost = 0.6 * start;
+  objective.success_cost = 0.6 * start;
   pool.extra = [=](const auto& batch) { return is_full(batch) ? 0.2 * start : 0.0; };
   planned(problem(12));
   bool kept = false;
   for (std::size_t i = 1; i < news.size(); ++i) {
-    kept =
-        kept || (!news[i].at_goal && news[i].cost > options.objective.success_cost && news[i].cost < news[i - 1].cost);
+    kept = kept || (!news[i].at_goal && news[i].cost > objective.success_cost && news[i].cost < news[i - 1].cost);
   }
   EXPECT_TRUE(kept);
 }

@@ -25,7 +25,9 @@ class SamplingTest : public testing::Test {
 
   Plan planned(const Problem& p) {
     SamplingPlanner sut(pool, options, [this](const Progress& progress) { news.push_back(progress); });
-    auto plan = sut.plan(p, kNever);
+    Problem asked = p;
+    asked.objective = objective;
+    auto plan = sut.plan(asked, kNever);
     if (!plan) {
       ADD_FAILURE() << plan.error().message;
       return {};
@@ -57,6 +59,7 @@ class SamplingTest : public testing::Test {
 
   BowlPool pool{kWanted};
   SamplingOptions options{.rollouts = 12};
+  physics_pool::Objective objective = physics_pool::Objective::standard();
   std::vector<Progress> news;
 };
 
@@ -161,10 +164,10 @@ TEST_P(SamplingMethod, SpendsTheRolloutsThatItsOptionsSay) {
 
 TEST_P(SamplingMethod, StopsAtSuccess) {
   pool.can_succeed = true;
-  options.objective.success_cost = 0.5 * pool.cost(problem(1).initial);
+  objective.success_cost = 0.5 * pool.cost(problem(1).initial);
   const Plan plan = planned(problem(1000));
   EXPECT_TRUE(plan.at_goal);
-  EXPECT_LE(plan.cost, options.objective.success_cost);
+  EXPECT_LE(plan.cost, objective.success_cost);
   EXPECT_LT(plan.iterations, 1000);
   for (std::size_t i = 0; i + 1 < news.size(); ++i) EXPECT_FALSE(news[i].at_goal);
 }
@@ -205,7 +208,7 @@ TEST_P(SamplingMethod, AsksForWhatItsOptionsSay) {
   options.step_duration = 0.7;
   options.min_steps = 3;
   options.limit = {1, 2, 3, 4};
-  options.objective["goal"].weight = 77;
+  objective["goal"].weight = 77;
   options.fidelity = {.freeze = true, .time_step = 0.01};
   (void)planned(problem(2));
   for (const RolloutBatch& batch : pool.batches) {

@@ -32,9 +32,9 @@ TEST(Parameters, KeepDefaultsOfWhatTheFileLeavesOut) {
   EXPECT_EQ(sut.planner.min_steps, wanted.planner.min_steps);
   EXPECT_EQ(sut.planner.step_duration, wanted.planner.step_duration);
   EXPECT_EQ(sut.planner.stop_losers, wanted.planner.stop_losers);
-  EXPECT_EQ(sut.planner.objective.weight("goal"), wanted.planner.objective.weight("goal"));
-  EXPECT_EQ(sut.planner.objective.value("edge", "exponent_max"), wanted.planner.objective.value("edge", "exponent_max"));
-  EXPECT_EQ(sut.planner.objective.success_cost, wanted.planner.objective.success_cost);
+  EXPECT_EQ(sut.objective.weight("goal"), wanted.objective.weight("goal"));
+  EXPECT_EQ(sut.objective.value("edge", "exponent_max"), wanted.objective.value("edge", "exponent_max"));
+  EXPECT_EQ(sut.objective.success_cost, wanted.objective.success_cost);
   EXPECT_EQ(sut.controller.control.many_iterations, wanted.controller.control.many_iterations);
   EXPECT_EQ(sut.controller.control.deviation_threshold, wanted.controller.control.deviation_threshold);
   EXPECT_EQ(sut.limits.timeout, wanted.limits.timeout);
@@ -44,18 +44,17 @@ TEST(Parameters, KeepDefaultsOfWhatTheFileLeavesOut) {
 // Whatever the catalogue has, files may say.
 TEST(Parameters, TakeEveryTermOfTheCatalogue) {
   for (const physics_pool::TermKind* kind : physics_pool::term_catalogue()) {
-    EXPECT_EQ(parsed(fmt::format("objective: {{{}: 0.125}}", kind->name)).planner.objective,
+    EXPECT_EQ(parsed(fmt::format("objective: {{{}: 0.125}}", kind->name)).objective,
               tests::objective_with({{kind->name, 0.125}}));
     for (const physics_pool::TermParameter& parameter : kind->parameters) {
       const std::string key = fmt::format("{}_{}", kind->name, parameter.name);
-      EXPECT_EQ(parsed(fmt::format("objective: {{{}: 0.125}}", key)).planner.objective,
-                tests::objective_with({{key, 0.125}}));
+      EXPECT_EQ(parsed(fmt::format("objective: {{{}: 0.125}}", key)).objective, tests::objective_with({{key, 0.125}}));
     }
   }
 }
 
 TEST(Parameters, StillCallTheGoalsAngleByItsFirstName) {
-  EXPECT_EQ(parsed("objective: {angle: 7}\n").planner.objective, tests::objective_with({{"goal_angle", 7}}));
+  EXPECT_EQ(parsed("objective: {angle: 7}\n").objective, tests::objective_with({{"goal_angle", 7}}));
 }
 
 TEST(Parameters, TakeEveryKey) {
@@ -88,26 +87,26 @@ mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straig
   EXPECT_TRUE(sut.planner.freeze);
   EXPECT_EQ(sut.planner.screening, 32);
   EXPECT_EQ(sut.planner.screening_time_step, 0.005);
-  EXPECT_EQ(sut.planner.objective, tests::objective_with({{"goal", 10},
-                                                          {"goal_angle", 11},
-                                                          {"acceleration", 12},
-                                                          {"disturbance", 13},
-                                                          {"disturbance_rotation", 14},
-                                                          {"edge", 15},
-                                                          {"edge_rate", 16},
-                                                          {"edge_exponent_max", 17},
-                                                          {"edge_margin", 18},
-                                                          {"topple", 19},
-                                                          {"topple_angle", 0.2},
-                                                          {"drop", 21},
-                                                          {"drop_height", 22},
-                                                          {"success_cost", 23},
-                                                          {"obstruction", 24},
-                                                          {"obstacle_target", 25},
-                                                          {"obstacle_pusher", 26},
-                                                          {"obstacle_nearest", 27},
-                                                          {"intrusion", 28},
-                                                          {"collision", 29}}));
+  EXPECT_EQ(sut.objective, tests::objective_with({{"goal", 10},
+                                                  {"goal_angle", 11},
+                                                  {"acceleration", 12},
+                                                  {"disturbance", 13},
+                                                  {"disturbance_rotation", 14},
+                                                  {"edge", 15},
+                                                  {"edge_rate", 16},
+                                                  {"edge_exponent_max", 17},
+                                                  {"edge_margin", 18},
+                                                  {"topple", 19},
+                                                  {"topple_angle", 0.2},
+                                                  {"drop", 21},
+                                                  {"drop_height", 22},
+                                                  {"success_cost", 23},
+                                                  {"obstruction", 24},
+                                                  {"obstacle_target", 25},
+                                                  {"obstacle_pusher", 26},
+                                                  {"obstacle_nearest", 27},
+                                                  {"intrusion", 28},
+                                                  {"collision", 29}}));
   EXPECT_EQ(sut.controller.control.many_iterations, 24);
   EXPECT_EQ(sut.controller.control.few_iterations, 25);
   EXPECT_EQ(sut.controller.control.deviation_threshold, 26);
@@ -130,16 +129,6 @@ mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straig
 TEST(Parameters, OfPushingAreThoseOfTheCode) {
   const auto result = load_parameters(std::filesystem::path(JOSTLE_SOURCE_DIR) / "experiments/pushing.yaml");
   ASSERT_TRUE(result) << result.error().message;
-  const planners::PbstoOptions &got = result->planner, wanted = planners::push_planner_options();
-  EXPECT_EQ(got.rollouts, wanted.rollouts);
-  EXPECT_EQ(got.sigma, wanted.sigma);
-  EXPECT_EQ(got.limit, wanted.limit);
-  EXPECT_EQ(got.scales, wanted.scales);
-  EXPECT_EQ(got.persistence, wanted.persistence);
-  EXPECT_EQ(got.update, wanted.update);
-  EXPECT_EQ(got.min_steps, wanted.min_steps);
-  EXPECT_EQ(got.step_duration, wanted.step_duration);
-  EXPECT_EQ(got.objective, wanted.objective);
   const planners::MpcOptions &mpc = result->controller.mpc, defaults;
   EXPECT_EQ(mpc.horizon, defaults.horizon);
   EXPECT_EQ(mpc.first_iterations, defaults.first_iterations);

@@ -4,7 +4,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cstring>
 #include <limits>
 
 namespace jostle::tests {
@@ -35,26 +34,11 @@ RolloutBatch odd_batch() {
                .draws = {9, UINT32_MAX}};
   batch.first_sample = UINT32_MAX - 5;
   batch.samples = 5;
-  batch.objective = {.goal = 1,
-                     .angle = 2,
-                     .acceleration = 3,
-                     .disturbance = 4,
-                     .disturbance_rotation = 5,
-                     .edge = 6,
-                     .edge_rate = 7,
-                     .edge_exponent_max = 8,
-                     .edge_margin = 9,
-                     .topple = 10,
-                     .topple_angle = 11,
-                     .drop = 12,
-                     .drop_height = 13,
-                     .obstruction = 15,
-                     .obstacle_target = 16,
-                     .obstacle_pusher = 17,
-                     .obstacle_nearest = 18,
-                     .collision = 20,
-                     .intrusion = 19,
+  batch.objective = {.terms = {{.kind = "goal", .weight = 1, .values = {2}},
+                               {.kind = "unheard of", .weight = -0.0},
+                               {.kind = "edge", .weight = 6, .values = {7, 8, 9}}},
                      .success_cost = 14};
+  batch.noise = {.sigma = 0.003, .slope = 0.4, .seed = UINT64_MAX};
   batch.incumbent = 0.1;
   batch.stop_losers = false;
   batch.stop_hopeless = true;
@@ -87,7 +71,8 @@ TEST(ConvertBatch, SurvivesTheWire) {
   EXPECT_EQ(got.law.draws, wanted.law.draws);
   EXPECT_EQ(got.first_sample, wanted.first_sample);
   EXPECT_EQ(got.samples, wanted.samples);
-  EXPECT_EQ(std::memcmp(&got.objective, &wanted.objective, sizeof wanted.objective), 0);
+  EXPECT_EQ(got.objective, wanted.objective);
+  EXPECT_EQ(got.noise, wanted.noise);
   EXPECT_EQ(got.incumbent, wanted.incumbent);
   EXPECT_EQ(got.stop_losers, wanted.stop_losers);
   EXPECT_EQ(got.stop_on_success, wanted.stop_on_success);
@@ -114,6 +99,7 @@ RolloutOutcome odd_outcome() {
           .thawed = 3,
           .at_goal = true,
           .step_costs = {0.1, -0.0},
+          .facts = {{.robot_hit_fixture = true}, {}},
           .trajectory = {{.q = {1, 2, 3}, .v = {4}}, {.q = {5, 6, -0.0}, .v = {kInfinity}}},
           .reason = "a reason"};
 }
@@ -131,6 +117,7 @@ TEST(ConvertOutcome, SurvivesTheWire) {
   EXPECT_EQ(got_result->thawed, wanted.thawed);
   EXPECT_EQ(got_result->at_goal, wanted.at_goal);
   EXPECT_EQ(hash_of(got_result->step_costs), hash_of(wanted.step_costs));
+  EXPECT_EQ(got_result->facts, wanted.facts);
   EXPECT_EQ(got_result->trajectory, wanted.trajectory);
   EXPECT_EQ(got_result->reason, wanted.reason);
 }
@@ -152,6 +139,7 @@ TEST(ConvertOutcome, RefusesWhatMakesNoSense) {
       {"end", [](auto& wire) { wire.end(200); }},
       {"cost", [](auto& wire) { wire.cost(std::numeric_limits<double>::quiet_NaN()); }},
       {"step_costs", [](auto& wire) { wire.steps(3); }},
+      {"facts", [](auto& wire) { wire.facts().pop_back(); }},
       {"trajectory", [](auto& wire) { wire.trajectory().pop_back(); }},
       {"trajectory", [](auto& wire) { wire.nq(0), wire.nv(0); }},
   };

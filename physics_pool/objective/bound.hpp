@@ -17,8 +17,9 @@ struct Outlook {
 };
 
 /// Bounds from below the cost that is still to come. Certain are the changes of control, and that what has
-/// dropped stays down. If a planar hand is to grasp, the goal's cost has a bound, too, as the target's distance
-/// shrinks no faster than hand and target can approach each other:
+/// dropped stays down. The goal's cost has a bound, too, where a task is done by coming near the target
+/// (TaskKind::distance_at_end), as its distance shrinks no faster than hand and target can approach each other. For a
+/// hand that moves in the plane:
 ///
 ///   d_T(end) >= d_T - sum_s (2·a_s + w_s·(d_T + a_0 + … + a_s) + f_s)·Delta_t
 ///
@@ -28,8 +29,11 @@ struct Outlook {
 /// that is fixed to the hand at the target's distance. A target that is
 /// squeezed out of a wedge or flung by a lever could be faster; none of some thousand random
 /// pushes was (bound_test.cpp, and equal plans in `jostle bench cheap-physics`).
-/// For other tasks, and for arms that do not move in the plane, the goal's cost has no bound: a pushed target, say, may
-/// have been given any speed.
+/// For other robots the fastest of their points stands for the hand, by the reaches of the axes, and for the target:
+///
+///   d_T(end) >= d_T - sum_s 2·(sum_i |u_i|·r_i)·Delta_t
+///
+/// For other tasks the goal's cost has no bound: a pushed target may have been given any speed.
 ///
 /// `u_before`: control before step `done`.
 Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const ControlSequence& controls, int done,

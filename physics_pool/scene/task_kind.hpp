@@ -30,6 +30,10 @@ struct TaskKind {
   /// How far the task is from its end, m.
   double (*distance)(const TaskGeometry& geometry, const State& x);
 
+  /// The largest `distance` at which the task can be done, m; null where nothing is foretold of how it comes about,
+  /// because a target that was set going needs nobody to get there (objective/bound.hpp).
+  double (*distance_at_end)(const TaskGeometry& geometry);
+
   /// Whether the target is where it is to be. It need not stand there: that is for `at_goal` to check.
   bool (*reached)(const TaskGeometry& geometry, const State& x);
 

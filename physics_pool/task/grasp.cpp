@@ -22,6 +22,10 @@ double cost(const TaskGeometry& geometry, const State& x, double angle_weight) {
 
 double distance(const TaskGeometry& geometry, const State& x) { return target_bearing(geometry, x).distance; }
 
+double distance_at_end(const TaskGeometry& geometry) {
+  return std::hypot(geometry.robot.hand->far, geometry.robot.hand->side);
+}
+
 std::string failure(const TaskGeometry&, const State&) { return ""; }
 
 }  // namespace
@@ -33,6 +37,7 @@ constexpr TaskKind kGrasp{.name = "grasp",
                           .misfit = misfit,
                           .cost = cost,
                           .distance = distance,
+                          .distance_at_end = distance_at_end,
                           .reached = in_pre_grasp_region,
                           .failure = failure};
 

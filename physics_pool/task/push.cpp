@@ -43,6 +43,7 @@ constexpr TaskKind kPush{.name = "push",
                          .misfit = misfit,
                          .cost = cost,
                          .distance = distance,
+                         .distance_at_end = nullptr,
                          .reached = reached,
                          .failure = failure};
 

@@ -35,6 +35,7 @@ constexpr TaskKind kReach{.name = "reach",
                           .misfit = misfit,
                           .cost = cost,
                           .distance = distance,
+                          .distance_at_end = [](const TaskGeometry&) { return kReached; },
                           .reached = reached,
                           .failure = failure};
 

@@ -50,6 +50,7 @@ TaskGeometry::TaskGeometry(const Scene& scene)
       target(scene.objects.at(static_cast<std::size_t>(layout.target))),
       robot(without_geoms(scene.robot.model)),
       base(transform(scene.robot.base)),
+      reaches(axis_reaches(scene.robot.model)),
       planar(as_planar(scene.robot.model)),
       disc_radius(physics_pool::disc_radius(scene.robot.model).value_or(0.0)) {
   target.name.clear();  // a copy must not allocate

@@ -23,6 +23,7 @@ struct TaskGeometry {
   SceneObject target;    ///< the target's shape, without its name; the state says where it is
   RobotModel robot;      ///< without its geoms, which cost copies and which nobody here asks for
   Eigen::Isometry3d base;
+  std::vector<double> reaches;        ///< [nu] axis_reaches() of the robot
   std::optional<PlanarRobot> planar;  ///< how the robot moves in the plane, if it does
   double disc_radius = 0.0;           ///< m, of a robot that is a disc; 0 for others
 

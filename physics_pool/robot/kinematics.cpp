@@ -2,7 +2,8 @@
 
 namespace jostle::physics_pool {
 
-Eigen::Isometry3d link_pose(const RobotModel& model, const Eigen::Isometry3d& base, std::span<const double> q, int link) {
+Eigen::Isometry3d link_pose(const RobotModel& model, const Eigen::Isometry3d& base, std::span<const double> q,
+                            int link) {
   // Parents come first and chains are short: no list of them is kept.
   const Link& l = model.links[static_cast<std::size_t>(link)];
   Eigen::Isometry3d X = (l.parent < 0 ? base : link_pose(model, base, q, l.parent)) * transform(l.pose);

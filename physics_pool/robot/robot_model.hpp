@@ -39,17 +39,17 @@ enum class GeomShape { kBox, kCylinder, kSphere, kMesh };
 struct RobotGeom {
   std::string name;
   GeomShape shape = GeomShape::kBox;
-  std::array<double, 3> size{};      ///< box: full extents x, y, z, m
+  std::array<double, 3> size{};       ///< box: full extents x, y, z, m
   double radius = 0.0, height = 0.0;  ///< cylinder and sphere, m
-  std::vector<double> vertices;      ///< mesh: [n][3], m; its convex hull is what touches
-  Pose pose;                         ///< X_LG, in the link
-  double mass = 0.0;                 ///< kg; 0 where the link has its inertia
-  std::string material = "steel";    ///< steel, dark or arm: pictures only
+  std::vector<double> vertices;       ///< mesh: [n][3], m; its convex hull is what touches
+  Pose pose;                          ///< X_LG, in the link
+  double mass = 0.0;                  ///< kg; 0 where the link has its inertia
+  std::string material = "steel";     ///< steel, dark or arm: pictures only
 
   bool operator==(const RobotGeom&) const = default;
 };
 
-/// Of a link whose inertia does not follow from its geoms.
+/// The weight of a link, where it does not follow from its geoms.
 struct Inertia {
   double mass = 0.0;                ///< kg
   Pose pose;                        ///< centre of mass, and the frame of `moments`
@@ -84,14 +84,14 @@ struct Axis {
 /// when its centre is in the pre-grasp region.
 struct Hand {
   int link = 0;
-  Pose pose;                         ///< X_LG
-  double near = 0.0, far = 0.0;      ///< m ahead of G, the pre-grasp region
-  double side = 0.0;                 ///< m either side of its middle
-  double depth = 0.0;                ///< m ahead of G, where approaches aim to have the target
-  double finger_length = 0.0;        ///< m
-  double stroke = 0.0;               ///< m, largest opening
-  int left = 0, right = 0;           ///< joints of the fingers; their positions are distances from the middle, m
-  int opening = 0;                   ///< the axis that moves both
+  Pose pose;                     ///< X_LG
+  double near = 0.0, far = 0.0;  ///< m ahead of G, the pre-grasp region
+  double side = 0.0;             ///< m either side of its middle
+  double depth = 0.0;            ///< m ahead of G, where approaches aim to have the target
+  double finger_length = 0.0;    ///< m
+  double stroke = 0.0;           ///< m, largest opening
+  int left = 0, right = 0;       ///< joints of the fingers; their positions are distances from the middle, m
+  int opening = 0;               ///< the axis that moves both
 
   bool operator==(const Hand&) const = default;
 };
@@ -116,7 +116,7 @@ struct PlanarRobot {
   int rotation = -1;  ///< axis of u, or -1: it has no heading
 };
 
-/// Whether a robot is one, by its joints.
+/// Whether a robot is one, by its joints and the axes that move them.
 std::optional<PlanarRobot> as_planar(const RobotModel& model);
 
 /// A planar robot that is nothing but an upright cylinder: its radius, m.
@@ -125,9 +125,9 @@ std::optional<double> disc_radius(const RobotModel& model);
 /// Axis::limit of every axis, in the order of u.
 std::vector<double> axis_limits(const RobotModel& model);
 
-/// Names unique, indices in range, parents before children, axes of length 1, masses and sizes sensible, and what
-/// is driven stable with steps of 2 ms: gain·0.002 at most half the armature.
-/// Error kInvalidArgument: "robot.joints[2] ('elbow').gain: got …, wanted …".
+/// Names unique, indices in range, parents before children, axes of length 1, masses and sizes sensible, inertias
+/// those of bodies, meshes not flat, and what is driven stable with steps of 2 ms: gain·0.002 at most half the
+/// armature. Error kInvalidArgument: "robot.joints[2] ('elbow').gain: got …, wanted …".
 Result<void> validate(const RobotModel& model);
 
 }  // namespace jostle::physics_pool

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <system_error>
 
 namespace jostle::embedded {
 extern const std::vector<std::pair<std::string_view, std::string_view>> kRobots;
@@ -107,7 +108,8 @@ void read_axis(Fields& in, RobotModel& model) {
   in.required("name", axis.name);
   std::vector<std::pair<std::string, double>> joints;
   in.pairs("joints", joints);
-  for (const auto& [name, factor] : joints) axis.joints.emplace_back(index_of(model.joints, name, in, "joints"), factor);
+  for (const auto& [name, factor] : joints)
+    axis.joints.emplace_back(index_of(model.joints, name, in, "joints"), factor);
   in.optional("limit", axis.limit);
   model.axes.push_back(std::move(axis));
 }
@@ -163,8 +165,8 @@ std::string pose_text(const Pose& pose) {
 }
 
 std::string joint_text(const Joint& joint) {
-  std::string text = fmt::format("{{name: {}, kind: {}, axis: [{}]", quoted(joint.name), word_of(kJointKinds, joint.kind),
-                                 fmt::join(joint.axis, ", "));
+  std::string text = fmt::format("{{name: {}, kind: {}, axis: [{}]", quoted(joint.name),
+                                 word_of(kJointKinds, joint.kind), fmt::join(joint.axis, ", "));
   if (joint.is_limited()) text += fmt::format(", range: [{}, {}]", joint.low, joint.high);
   return text + fmt::format(", armature: {}, gain: {}, force_limit: {}, start: {}}}", joint.armature, joint.gain,
                             joint.force_limit, joint.start);
@@ -173,7 +175,8 @@ std::string joint_text(const Joint& joint) {
 std::string geom_text(const RobotGeom& geom) {
   std::string text = fmt::format("{{name: {}, shape: {}", quoted(geom.name), word_of(kShapes, geom.shape));
   if (geom.shape == GeomShape::kBox) text += fmt::format(", size: [{}]", fmt::join(geom.size, ", "));
-  if (geom.shape == GeomShape::kCylinder || geom.shape == GeomShape::kSphere) text += fmt::format(", radius: {}", geom.radius);
+  if (geom.shape == GeomShape::kCylinder || geom.shape == GeomShape::kSphere)
+    text += fmt::format(", radius: {}", geom.radius);
   if (geom.shape == GeomShape::kCylinder) text += fmt::format(", height: {}", geom.height);
   if (geom.shape == GeomShape::kMesh) text += fmt::format(", vertices: [{}]", fmt::join(geom.vertices, ", "));
   return text + fmt::format(", pose: {}, mass: {}, material: {}}}", pose_text(geom.pose), geom.mass, geom.material);
@@ -194,7 +197,8 @@ Result<RobotModel> parse_robot(std::string_view text, const std::string& origin)
     if (version != 1) fields.refuse("jostle_robot", fmt::format("got version {}, wanted 1", version));
     RobotModel model = read_robot(fields);
     fields.finish();
-    if (auto ok = validate(model); !ok) return Error{ok.error().code, fmt::format("{}: {}", origin, ok.error().message)};
+    if (auto ok = validate(model); !ok)
+      return Error{ok.error().code, fmt::format("{}: {}", origin, ok.error().message)};
     return model;
   });
 }
@@ -202,7 +206,7 @@ Result<RobotModel> parse_robot(std::string_view text, const std::string& origin)
 Result<RobotModel> load_robot(const fs::path& file, const RobotPath& path) {
   auto text_result = read_file(file);
   if (!text_result) return text_result.error();
-  if (file.extension() == ".urdf") return parse_urdf(*text_result, file.string(), path);
+  if (file.extension() == ".urdf" || file.extension() == ".xacro") return parse_urdf(*text_result, file.string(), path);
   return parse_robot(*text_result, file.string());
 }
 
@@ -236,7 +240,8 @@ std::string robot_text(const RobotModel& model, int indent) {
     if (link.parent >= 0) out.line("    parent: {}", quoted(model.links[static_cast<std::size_t>(link.parent)].name));
     out.line("    pose: {}", pose_text(link.pose));
     if (!link.joints.empty()) out.line("    joints:");
-    for (const int joint : link.joints) out.line("      - {}", joint_text(model.joints[static_cast<std::size_t>(joint)]));
+    for (const int joint : link.joints)
+      out.line("      - {}", joint_text(model.joints[static_cast<std::size_t>(joint)]));
     if (link.inertia) {
       out.line("    inertia: {{mass: {}, pose: {}, moments: [{}]}}", link.inertia->mass, pose_text(link.inertia->pose),
                fmt::join(link.inertia->moments, ", "));
@@ -278,11 +283,12 @@ Result<RobotModel> builtin_robot(std::string_view name) {
     if (stem == name) return parse_robot(text, fmt::format("models/{}", file));
     known.push_back(stem);
   }
-  return Error{Code::kNotFound, fmt::format("robot.model: got '{}', wanted {}, or a file", name, fmt::join(known, ", "))};
+  return Error{Code::kNotFound,
+               fmt::format("robot.model: got '{}', wanted {}, or a file", name, fmt::join(known, ", "))};
 }
 
 RobotPath robot_path(const fs::path& base) {
-  RobotPath path{.base = base};
+  RobotPath path{.base = base.empty() ? "." : base};
   add_folders(path, "JOSTLE_MODELS", "");
   add_folders(path, "ROS_PACKAGE_PATH", "");
   add_folders(path, "AMENT_PREFIX_PATH", "share");
@@ -290,21 +296,26 @@ RobotPath robot_path(const fs::path& base) {
 }
 
 Result<RobotModel> find_robot(const std::string& name, const RobotPath& path) {
-  if (auto model_result = builtin_robot(name); model_result || model_result.error().code != Code::kNotFound) return model_result;
-  std::vector<fs::path> folders{path.base};
+  if (auto model_result = builtin_robot(name); model_result || model_result.error().code != Code::kNotFound)
+    return model_result;
+  std::vector<fs::path> folders;
+  if (!path.base.empty()) folders.push_back(path.base);
   folders.insert(folders.end(), path.folders.begin(), path.folders.end());
+  if (folders.empty()) return builtin_robot(name);  // of text alone: names there are no files
   std::vector<std::string> tried;
   for (const fs::path& folder : folders) {
     for (const char* ending : {"", ".yaml", ".urdf", "/robot.yaml"}) {
       const fs::path file = folder / (name + ending);
-      if (fs::is_regular_file(file)) return load_robot(file, path);
+      std::error_code ignored;  // a name that no file can have is a name of no file
+      if (fs::is_regular_file(file, ignored)) return load_robot(file, path);
     }
-    tried.push_back(folder.empty() ? "." : folder.string());
+    tried.push_back(folder.string());
   }
-  return Error{Code::kNotFound,
-               fmt::format("robot.model: got '{}', wanted planar_gripper, pusher, or a file of that name (also with .yaml, "
-                           ".urdf or /robot.yaml) in: {}; JOSTLE_MODELS adds folders",
-                           name, fmt::join(tried, ", "))};
+  return Error{
+      Code::kNotFound,
+      fmt::format("robot.model: got '{}', wanted planar_gripper, pusher, or a file of that name (also with .yaml, "
+                  ".urdf or /robot.yaml) in: {}; JOSTLE_MODELS adds folders",
+                  name, fmt::join(tried, ", "))};
 }
 
 }  // namespace jostle::physics_pool

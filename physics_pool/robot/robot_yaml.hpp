@@ -24,7 +24,7 @@ Result<RobotModel> builtin_robot(std::string_view name);
 
 /// Where robots are looked for, and `package://NAME/` of their meshes.
 struct RobotPath {
-  std::filesystem::path base;                 ///< of names that are relative paths: the scene file's folder
+  std::filesystem::path base;                  ///< of names that are relative paths: the scene file's folder
   std::vector<std::filesystem::path> folders;  ///< of models and ROS packages, in this order
 };
 
@@ -32,7 +32,8 @@ struct RobotPath {
 RobotPath robot_path(const std::filesystem::path& base);
 
 /// A robot by what a scene calls it: the name of a built-in model, or a file NAME.yaml or NAME.urdf, relative
-/// to the scene's or in one of the folders (also NAME/robot.yaml there).
+/// to the scene's or in one of the folders (also NAME/robot.yaml there). Without base and folders there are built-in
+/// models only.
 /// Errors   kNotFound          no such model; the message lists where it was looked for
 ///          kInvalidArgument   the file says something wrong; names file, line and remedy
 Result<RobotModel> find_robot(const std::string& name, const RobotPath& path);

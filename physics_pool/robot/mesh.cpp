@@ -8,11 +8,12 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <iterator>
+#include <limits>
 #include <numbers>
 #include <set>
 #include <sstream>
 #include <string>
+#include <vector>
 
 namespace jostle::physics_pool {
 namespace {
@@ -20,7 +21,18 @@ namespace {
 using Point = std::array<double, 3>;
 
 constexpr std::size_t kHeader = 84, kTriangle = 50;  // bytes of a binary STL
-constexpr std::size_t kDirections = 400;
+constexpr std::size_t kDirections = 400, kAxes = 6;  // the first are those of the axes: a mesh keeps its extents
+constexpr double kDamaged = std::numeric_limits<double>::quiet_NaN();
+
+Result<std::string> read_bytes(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes, piece(1 << 16, ' ');
+  while (in.read(piece.data(), static_cast<std::streamsize>(piece.size())) || in.gcount() > 0) {
+    bytes.append(piece, 0, static_cast<std::size_t>(in.gcount()));
+  }
+  if (!in.eof()) return Error{Code::kIo, file.string() + ": cannot be read"};
+  return bytes;
+}
 
 bool is_binary_stl(const std::string& bytes) {
   if (bytes.size() < kHeader) return false;
@@ -29,36 +41,48 @@ bool is_binary_stl(const std::string& bytes) {
   return bytes.size() == kHeader + std::size_t{triangles} * kTriangle;
 }
 
-std::set<Point> binary_stl(const std::string& bytes) {
-  std::set<Point> points;
+std::vector<Point> binary_stl(const std::string& bytes) {
+  std::vector<Point> points;
   for (std::size_t at = kHeader; at + kTriangle <= bytes.size(); at += kTriangle) {
     float corners[9];  // after the normal
     std::memcpy(corners, bytes.data() + at + 12, sizeof corners);
-    for (int i = 0; i < 9; i += 3) points.insert({corners[i], corners[i + 1], corners[i + 2]});
+    for (int i = 0; i < 9; i += 3) points.push_back({corners[i], corners[i + 1], corners[i + 2]});
   }
   return points;
 }
 
 // Lines "WORD x y z": "vertex" of a text STL, "v" of an OBJ.
-std::set<Point> lines_of(const std::string& text, const std::string& word) {
-  std::set<Point> points;
+std::vector<Point> lines_of(const std::string& text, const std::string& word) {
+  std::vector<Point> points;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);
     std::string first;
+    if (!(words >> first) || first != word) continue;
     Point point;
-    if (words >> first && first == word && words >> point[0] >> point[1] >> point[2]) points.insert(point);
+    if (!(words >> point[0] >> point[1] >> point[2])) point.fill(kDamaged);
+    points.push_back(point);
   }
   return points;
 }
 
-// The farthest points along directions that are spread evenly (a Fibonacci sphere).
+// Direction i of those along the axes, and then of others that are spread evenly (a Fibonacci sphere).
+Point direction(std::size_t i) {
+  if (i < kAxes) {
+    Point along{};
+    along[i / 2] = i % 2 == 0 ? 1 : -1;
+    return along;
+  }
+  const auto number = static_cast<double>(i - kAxes);
+  const double z = 1 - 2 * (number + 0.5) / (kDirections - kAxes), level = std::sqrt(1 - z * z);
+  const double turn = std::numbers::pi * (3 - std::sqrt(5.0)) * number;
+  return {level * std::cos(turn), level * std::sin(turn), z};
+}
+
 std::set<Point> farthest(const std::set<Point>& points) {
   std::set<Point> kept;
   for (std::size_t i = 0; i < kDirections; ++i) {
-    const double z = 1 - 2 * (static_cast<double>(i) + 0.5) / kDirections, level = std::sqrt(1 - z * z);
-    const double turn = std::numbers::pi * (3 - std::sqrt(5.0)) * static_cast<double>(i);
-    const Point d{level * std::cos(turn), level * std::sin(turn), z};
+    const Point d = direction(i);
     const auto along = [&](const Point& p) { return d[0] * p[0] + d[1] * p[1] + d[2] * p[2]; };
     kept.insert(*std::ranges::max_element(points, {}, along));
   }
@@ -68,20 +92,25 @@ std::set<Point> farthest(const std::set<Point>& points) {
 }  // namespace
 
 Result<std::vector<double>> mesh_vertices(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(in)), {});
-  if (!in) return Error{Code::kIo, file.string() + ": cannot be read"};
+  auto bytes_result = read_bytes(file);
+  if (!bytes_result) return bytes_result.error();
+  const std::string& bytes = *bytes_result;
   std::string ending = file.extension().string();
   std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  std::set<Point> points;
+  std::vector<Point> found;
   if (ending == ".stl") {
-    points = is_binary_stl(bytes) ? binary_stl(bytes) : lines_of(bytes, "vertex");
+    found = is_binary_stl(bytes) ? binary_stl(bytes) : lines_of(bytes, "vertex");
   } else if (ending == ".obj") {
-    points = lines_of(bytes, "v");
+    found = lines_of(bytes, "v");
   } else {
     return invalid(file.string(), fmt::format("a mesh of format '{}'", ending),
                    "STL or OBJ; remedy: convert it, for example with meshlabserver or Blender");
   }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (std::ranges::all_of(found[i], [](double value) { return std::isfinite(value); })) continue;
+    return invalid(file.string(), fmt::format("a damaged vertex, number {}", i + 1), "three finite numbers each");
+  }
+  std::set<Point> points(found.begin(), found.end());
   if (points.size() < 4) {
     return invalid(file.string(), fmt::format("{} points in {} bytes", points.size(), bytes.size()), "4 or more");
   }

@@ -1,7 +1,9 @@
 #include "physics_pool/robot/robot_model.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -11,6 +13,8 @@ namespace {
 
 constexpr double kDriveRatio = 0.5;  // gain·h/armature: explicit drives overshoot above 1, diverge above 2
 constexpr double kStep = 0.002;      // s
+constexpr double kMostMass = 1000;   // kg, of a link or a geom
+constexpr const char* kWantedPose = "finite ones and a unit quaternion";
 
 bool is_axis(const Joint& joint, JointKind kind, const std::array<double, 3>& axis) {
   return joint.kind == kind && joint.axis == axis;
@@ -29,9 +33,18 @@ bool is_unit(const std::array<double, 3>& v) { return std::abs(v[0] * v[0] + v[1
 bool is_unit(const std::array<double, 4>& q) {
   return std::abs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1) < 1e-6;
 }
-bool is_finite(const Pose& pose) {
-  const auto finite = [](double value) { return std::isfinite(value); };
-  return std::ranges::all_of(pose.position, finite) && is_unit(pose.orientation);
+bool all_finite(std::span<const double> values) {
+  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+}
+bool is_finite(const Pose& pose) { return all_finite(pose.position) && is_unit(pose.orientation); }
+
+// m; how thin points are that all but lie in a plane, across the direction in which they spread least.
+double thickness(std::span<const double> vertices) {
+  const Eigen::Map<const Eigen::Matrix3Xd> points(vertices.data(), 3, static_cast<Eigen::Index>(vertices.size() / 3));
+  const Eigen::Matrix3Xd spread = points.colwise() - points.rowwise().mean();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread * spread.transpose());
+  const Eigen::RowVectorXd across = solver.eigenvectors().col(0).transpose() * spread;
+  return across.maxCoeff() - across.minCoeff();
 }
 
 Error wrong(const std::string& field, double got, const std::string& wanted) {
@@ -44,8 +57,14 @@ Result<void> check_joint(const std::string& at, const Joint& joint) {
     return invalid(at + ".axis", fmt::format("[{}, {}, {}]", joint.axis[0], joint.axis[1], joint.axis[2]),
                    "a vector of length 1");
   }
-  if (!(joint.low <= joint.high)) return wrong(at + ".range", joint.low, fmt::format("at most {}", joint.high));
-  if (joint.is_limited() && !std::isfinite(joint.low)) return wrong(at + ".range", joint.low, "two finite numbers");
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const bool is_free = joint.low == -kInfinity && joint.high == kInfinity;
+  if (!is_free && !(joint.low < joint.high && std::isfinite(joint.low) && std::isfinite(joint.high))) {
+    return invalid(
+        at + ".range", fmt::format("[{}, {}]", joint.low, joint.high),
+        "two finite numbers, the lower first; remedy: leave it out where nothing limits the joint, and the joint "
+        "where it does not move");
+  }
   if (!(joint.armature >= 0 && joint.armature <= 1e6)) return wrong(at + ".armature", joint.armature, "0 to 1e6");
   if (!(joint.gain >= 0 && joint.gain * kStep <= kDriveRatio * std::max(joint.armature, 1e-9))) {
     return wrong(
@@ -54,11 +73,33 @@ Result<void> check_joint(const std::string& at, const Joint& joint) {
                     "armature",
                     kDriveRatio * joint.armature / kStep, kDriveRatio, joint.armature, kStep));
   }
-  if (joint.gain > 0 && !(joint.force_limit > 0)) return wrong(at + ".force_limit", joint.force_limit, "more than 0");
-  if (!(joint.start >= joint.low && joint.start <= joint.high)) {
+  const bool has_force = joint.gain > 0 ? joint.force_limit > 0 : joint.force_limit >= 0;
+  if (!has_force || !std::isfinite(joint.force_limit)) {
+    return wrong(at + ".force_limit", joint.force_limit, "a finite number more than 0");
+  }
+  if (!(joint.start >= joint.low && joint.start <= joint.high && std::isfinite(joint.start))) {
     return wrong(at + ".start", joint.start, fmt::format("{} to {}", joint.low, joint.high));
   }
   return {};
+}
+
+// What the engine asks of every inertia: positive principal moments, none above the sum of the others.
+Result<void> check_inertia(const std::string& at, const Inertia& inertia) {
+  if (!(inertia.mass > 0 && inertia.mass <= kMostMass)) {
+    return wrong(at + ".mass", inertia.mass, fmt::format("more than 0, and at most {} kg", kMostMass));
+  }
+  if (!is_finite(inertia.pose)) return invalid(at + ".pose", "numbers that are no pose", kWantedPose);
+  const auto& [xx, yy, zz, xy, xz, yz] = inertia.moments;
+  Eigen::Matrix3d moments;
+  moments << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  Eigen::Vector3d principal = Eigen::Vector3d::Zero();  // ascending
+  if (all_finite(inertia.moments)) principal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvalues();
+  // A plate has C = A + B, and rounding on either side of it.
+  if (principal[0] > 0 && principal[2] <= (principal[0] + principal[1]) * (1 + 1e-6)) return {};
+  return invalid(
+      at + ".moments", fmt::format("[{}]", fmt::join(inertia.moments, ", ")),
+      "moments of a body: the principal ones above 0, and none above the sum of the other two; remedy: those of "
+      "a solid cylinder of that size");
 }
 
 Result<void> check_geom(const std::string& at, const RobotGeom& geom) {
@@ -85,9 +126,13 @@ Result<void> check_geom(const std::string& at, const RobotGeom& geom) {
   if (std::ranges::any_of(geom.vertices, [](double value) { return !(std::abs(value) <= kMost); })) {
     return invalid(at + ".vertices", "a number that is not finite, or too large", fmt::format("-{0} to {0} m", kMost));
   }
-  if (!(geom.mass >= 0 && geom.mass <= 1000)) return wrong(at + ".mass", geom.mass, "0 to 1000 kg");
-  if (!is_finite(geom.pose))
-    return invalid(at + ".pose", "numbers that are no pose", "finite ones and a unit quaternion");
+  if (geom.shape == GeomShape::kMesh && thickness(geom.vertices) < kLeast) {
+    return invalid(at + ".vertices", "points in a plane",
+                   fmt::format("a hull {} m thick or more; remedy: a box", kLeast));
+  }
+  if (!(geom.mass >= 0 && geom.mass <= kMostMass))
+    return wrong(at + ".mass", geom.mass, fmt::format("0 to {} kg", kMostMass));
+  if (!is_finite(geom.pose)) return invalid(at + ".pose", "numbers that are no pose", kWantedPose);
   static const std::set<std::string> kMaterials{"arm", "dark", "steel"};
   if (!kMaterials.contains(geom.material))
     return invalid(at + ".material", "'" + geom.material + "'", "arm, dark or steel");
@@ -116,6 +161,7 @@ std::vector<double> RobotModel::start() const {
 
 std::optional<PlanarRobot> as_planar(const RobotModel& model) {
   if (model.links.empty() || model.links[0].parent != -1 || model.links[0].joints.size() < 2) return {};
+  if (model.links[0].pose.orientation != Pose{}.orientation) return {};  // its axes are not the world's
   const std::vector<int>& joints = model.links[0].joints;
   const auto joint = [&](std::size_t i) -> const Joint& { return model.joints[static_cast<std::size_t>(joints[i])]; };
   if (!is_axis(joint(0), JointKind::kSlide, {1, 0, 0}) || !is_axis(joint(1), JointKind::kSlide, {0, 1, 0})) return {};
@@ -150,7 +196,11 @@ Result<void> validate(const RobotModel& model) {
   if (model.joints.size() > kMostJoints || model.axes.size() > kMostJoints) {
     return invalid("robot.joints", fmt::format("{}", model.joints.size()), fmt::format("at most {}", kMostJoints));
   }
-  std::set<std::string> names;
+  constexpr std::size_t kMostLinks = 256;  // who follows a chain of links does so by recursion
+  if (model.links.size() > kMostLinks) {
+    return invalid("robot.links", fmt::format("{}", model.links.size()), fmt::format("at most {}", kMostLinks));
+  }
+  std::set<std::string> names, geom_names;
   std::vector<int> uses(model.joints.size(), 0);
   for (std::size_t i = 0; i < model.links.size(); ++i) {
     const Link& link = model.links[i];
@@ -160,10 +210,9 @@ Result<void> validate(const RobotModel& model) {
     if (link.parent < -1 || link.parent >= static_cast<int>(i)) {
       return wrong(at + ".parent", link.parent, "an earlier link, or -1");
     }
-    if (!is_finite(link.pose))
-      return invalid(at + ".pose", "numbers that are no pose", "finite ones and a unit quaternion");
-    if (link.inertia && !(link.inertia->mass > 0 && is_finite(link.inertia->pose))) {
-      return wrong(at + ".inertia.mass", link.inertia->mass, "more than 0 kg");
+    if (!is_finite(link.pose)) return invalid(at + ".pose", "numbers that are no pose", kWantedPose);
+    if (link.inertia) {
+      if (auto ok = check_inertia(at + ".inertia", *link.inertia); !ok) return ok;
     }
     for (const int joint : link.joints) {
       if (!in_range(joint, model.joints.size()))
@@ -171,7 +220,11 @@ Result<void> validate(const RobotModel& model) {
       ++uses[static_cast<std::size_t>(joint)];
     }
     for (std::size_t k = 0; k < link.geoms.size(); ++k) {
-      if (auto ok = check_geom(fmt::format("{}.geoms[{}]", at, k), link.geoms[k]); !ok) return ok;
+      const std::string geom_at = fmt::format("{}.geoms[{}]", at, k);
+      if (auto ok = check_geom(geom_at, link.geoms[k]); !ok) return ok;
+      const std::string& name = link.geoms[k].name;
+      if (!name.empty() && !geom_names.insert(name).second)
+        return invalid(geom_at + ".name", "'" + name + "'", "a name of its own");
     }
     double mass = link.inertia ? link.inertia->mass : 0.0;
     for (const RobotGeom& geom : link.geoms) mass += geom.mass;
@@ -199,9 +252,11 @@ Result<void> validate(const RobotModel& model) {
       return invalid(at + ".name", "'" + axis.name + "'", "a name of its own");
     if (axis.joints.empty()) return invalid(at + ".joints", "none", "one at least");
     if (!(axis.limit > 0 && std::isfinite(axis.limit))) return wrong(at + ".limit", axis.limit, "more than 0");
+    std::set<int> moved;
     for (const auto& [joint, factor] : axis.joints) {
       if (!in_range(joint, model.joints.size()))
         return wrong(at + ".joints", joint, fmt::format("0 to {}", model.joints.size() - 1));
+      if (!moved.insert(joint).second) return wrong(at + ".joints", joint, "each joint once");
       if (!std::isfinite(factor) || factor == 0)
         return wrong(at + ".joints", factor, "a factor that is finite and not 0");
       if (!(model.joints[static_cast<std::size_t>(joint)].gain > 0)) {
@@ -218,10 +273,13 @@ Result<void> validate(const RobotModel& model) {
     return invalid("robot.hand.fingers", "a joint that there is not", "two joints");
   }
   if (!in_range(hand.opening, model.axes.size())) return wrong("robot.hand.opening", hand.opening, "an axis");
-  if (!(hand.near >= 0 && hand.far > hand.near && hand.side > 0 && hand.depth > 0 && hand.finger_length > 0 &&
-        hand.stroke > 0 && hand.stroke < 10)) {
+  if (hand.left == hand.right) return invalid("robot.hand.fingers", "one joint twice", "two joints");
+  if (!is_finite(hand.pose)) return invalid("robot.hand.pose", "numbers that are no pose", kWantedPose);
+  const std::array<double, 6> measures{hand.near, hand.far, hand.side, hand.depth, hand.finger_length, hand.stroke};
+  if (!(std::ranges::all_of(measures, [](double value) { return value < 10; }) && hand.near >= 0 &&
+        hand.far > hand.near && hand.side > 0 && hand.depth > 0 && hand.finger_length > 0 && hand.stroke > 0)) {
     return invalid("robot.hand", "measures that do not fit",
-                   "0 <= near < far; side, depth, finger_length, stroke > 0 m");
+                   "0 <= near < far; side, depth, finger_length, stroke > 0; all below 10 m");
   }
   return {};
 }

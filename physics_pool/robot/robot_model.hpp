@@ -116,7 +116,7 @@ struct PlanarRobot {
   int rotation = -1;  ///< axis of u, or -1: it has no heading
 };
 
-/// Says how a robot moves in the plane, if its joints make it a planar one.
+/// Says how a robot moves in the plane, if its joints and the axes that move them make it a planar one.
 std::optional<PlanarRobot> as_planar(const RobotModel& model);
 
 /// Returns the radius, m, of a planar robot that is nothing but an upright cylinder; nothing for other robots.
@@ -126,8 +126,8 @@ std::optional<double> disc_radius(const RobotModel& model);
 std::vector<double> axis_limits(const RobotModel& model);
 
 /// Checks that names are unique, indices in range, parents before children, axes of length 1, masses and sizes
-/// sensible, and driven joints stable with steps of 2 ms: gain·0.002 at most half the armature.
-/// Error kInvalidArgument: "robot.joints[2] ('elbow').gain: got …, wanted …".
+/// sensible, inertias those of bodies, meshes not flat, and driven joints stable with steps of 2 ms: gain·0.002 at most
+/// half the armature. Error kInvalidArgument: "robot.joints[2] ('elbow').gain: got …, wanted …".
 Result<void> validate(const RobotModel& model);
 
 }  // namespace jostle::physics_pool

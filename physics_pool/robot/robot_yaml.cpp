@@ -8,6 +8,7 @@
 #include <iterator>
 #include <span>
 #include <sstream>
+#include <system_error>
 
 namespace jostle::embedded {
 extern const std::span<const std::pair<std::string_view, std::string_view>> kRobots;
@@ -206,7 +207,7 @@ Result<RobotModel> parse_robot(std::string_view text, const std::string& origin)
 Result<RobotModel> load_robot(const fs::path& file, const RobotPath& path) {
   auto text_result = read_file(file);
   if (!text_result) return text_result.error();
-  if (file.extension() == ".urdf") return parse_urdf(*text_result, file.string(), path);
+  if (file.extension() == ".urdf" || file.extension() == ".xacro") return parse_urdf(*text_result, file.string(), path);
   return parse_robot(*text_result, file.string());
 }
 
@@ -288,7 +289,7 @@ Result<RobotModel> builtin_robot(std::string_view name) {
 }
 
 RobotPath robot_path(const fs::path& base) {
-  RobotPath path{.opens_files = true, .base = base};
+  RobotPath path{.base = base.empty() ? "." : base};
   add_folders(path, "JOSTLE_MODELS", "");
   add_folders(path, "ROS_PACKAGE_PATH", "");
   add_folders(path, "AMENT_PREFIX_PATH", "share");
@@ -298,16 +299,18 @@ RobotPath robot_path(const fs::path& base) {
 Result<RobotModel> find_robot(const std::string& name, const RobotPath& path) {
   if (auto model_result = builtin_robot(name); model_result || model_result.error().code != Code::kNotFound)
     return model_result;
-  if (!path.opens_files) return builtin_robot(name);
-  std::vector<fs::path> folders{path.base};
+  std::vector<fs::path> folders;
+  if (!path.base.empty()) folders.push_back(path.base);
   folders.insert(folders.end(), path.folders.begin(), path.folders.end());
+  if (folders.empty()) return builtin_robot(name);  // of text alone: names there are no files
   std::vector<std::string> tried;
   for (const fs::path& folder : folders) {
     for (const char* ending : {"", ".yaml", ".urdf", "/robot.yaml"}) {
       const fs::path file = folder / (name + ending);
-      if (fs::is_regular_file(file)) return load_robot(file, path);
+      std::error_code ignored;  // a name that no file can have is a name of no file
+      if (fs::is_regular_file(file, ignored)) return load_robot(file, path);
     }
-    tried.push_back(folder.empty() ? "." : folder.string());
+    tried.push_back(folder.string());
   }
   return Error{
       Code::kNotFound,

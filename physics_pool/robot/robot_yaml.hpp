@@ -25,7 +25,6 @@ Result<RobotModel> builtin_robot(std::string_view name);
 /// Where robots are looked for, and the `package://NAME/` of their meshes. An empty path opens no files at all: that
 /// is for scenes that came from elsewhere.
 struct RobotPath {
-  bool opens_files = false;
   std::filesystem::path base;                  ///< where relative paths begin: the scene file's folder
   std::vector<std::filesystem::path> folders;  ///< with models and ROS packages, searched in this order
 };
@@ -35,7 +34,8 @@ struct RobotPath {
 RobotPath robot_path(const std::filesystem::path& base);
 
 /// Finds a robot by what a scene calls it: the name of a built-in model, or a file NAME.yaml or NAME.urdf, relative
-/// to the scene's or in one of the folders (also NAME/robot.yaml there).
+/// to the scene's or in one of the folders (also NAME/robot.yaml there). Without base and folders there are built-in
+/// models only.
 /// Errors   kNotFound          no such model; the message lists where it was looked for
 ///          kInvalidArgument   the file says something wrong; names file, line and remedy
 Result<RobotModel> find_robot(const std::string& name, const RobotPath& path);

@@ -8,7 +8,9 @@
 
 #include <cmath>
 #include <map>
-#include <numbers>
+#include <set>
+#include <string_view>
+#include <system_error>
 
 #include "physics_pool/robot/mesh.hpp"
 #include "physics_pool/robot/robot_yaml.hpp"
@@ -30,50 +32,172 @@ Pose from_urdf(const urdf::Pose& pose) {
           .orientation = {pose.rotation.w, pose.rotation.x, pose.rotation.y, pose.rotation.z}};
 }
 
-// Reads one file; every complaint is thrown as yaml::Malformed with file and line.
+using tinyxml2::XMLElement;
+
+// What of xacro is left in an element or below it; null if nothing is.
+const XMLElement* find_xacro(const XMLElement& element) {
+  if (std::string_view(element.Name()).starts_with("xacro:")) return &element;
+  for (const auto* a = element.FirstAttribute(); a; a = a->Next()) {
+    const std::string_view value = a->Value();
+    if (value.find("${") != value.npos || value.find("$(") != value.npos) return &element;
+  }
+  for (const auto* e = element.FirstChildElement(); e; e = e->NextSiblingElement()) {
+    if (const XMLElement* found = find_xacro(*e)) return found;
+  }
+  return nullptr;
+}
+
+std::string attribute(const XMLElement* element, const char* name) {
+  const char* value = element ? element->Attribute(name) : nullptr;
+  return value ? value : "";
+}
+
+// Reads one file; every complaint is thrown as an Error with file and line.
 class Reader {
  public:
   Reader(const std::string& xml, const std::string& origin, const RobotPath& path) : origin_(origin), path_(path) {
     tinyxml2::XMLDocument document;
     if (document.Parse(xml.data(), xml.size()) != tinyxml2::XML_SUCCESS) {
-      throw yaml::Malformed{fmt::format("{}:{}: not XML: {}", origin, document.ErrorLineNum(), document.ErrorStr())};
+      refuse_at(document.ErrorLineNum(), fmt::format("not XML: {}", document.ErrorStr()));
     }
-    const tinyxml2::XMLElement* robot = document.FirstChildElement("robot");
-    if (!robot)
-      throw yaml::Malformed{origin + ":1: got no <robot>, wanted a URDF file; remedy: run xacro on .xacro files"};
+    const XMLElement* robot = document.FirstChildElement("robot");
+    if (!robot) refuse_at(1, "got no <robot>, wanted a URDF file");
+    if (const XMLElement* xacro = find_xacro(*robot)) {
+      refuse_at(xacro->GetLineNum(), fmt::format("<{}>: got xacro, wanted plain URDF; remedy: xacro {} > NAME.urdf",
+                                                 xacro->Name(), fs::path(origin).filename().string()));
+    }
     for (const auto* e = robot->FirstChildElement(); e; e = e->NextSiblingElement()) {
       if (const char* name = e->Attribute("name")) lines_[{e->Name(), name}] = e->GetLineNum();
     }
-    urdf_ = urdf::parseURDF(xml);
-    if (!urdf_) {
-      throw yaml::Malformed{origin +
-                            ": the URDF parser refused it (its words are above); wanted links and joints that "
-                            "make one tree"};
+    for (const auto* link = robot->FirstChildElement("link"); link; link = link->NextSiblingElement("link")) {
+      Parts& parts = parts_[attribute(link, "name")];
+      parts.has_inertial = link->FirstChildElement("inertial");
+      for (const auto* e = link->FirstChildElement("collision"); e; e = e->NextSiblingElement("collision")) {
+        ++parts.collisions;
+      }
     }
+    check_joints(*robot);
+    check_root(*robot);
+    urdf_ = urdf::parseURDF(xml);
+    if (!urdf_)
+      refuse_at(1, "the URDF parser refused it, in the words above; wanted what wiki.ros.org/urdf/XML describes");
   }
 
   RobotModel read() {
     model_.name = urdf_->getName();
     model_.carries_itself = true;
-    add_link(*urdf_->getRoot(), -1, nullptr);
+    add_link(*urdf_->getRoot(), -1, nullptr, false);
+    check_reach();
     add_mimics();
+    if (auto ok = validate(model_); !ok) throw located(ok.error());
     return std::move(model_);
   }
 
  private:
-  [[noreturn]] void refuse(const char* element, const std::string& name, const std::string& problem) const {
+  [[noreturn]] void refuse_at(int line, const std::string& problem, Code code = Code::kInvalidArgument) const {
+    throw Error{code, fmt::format("{}:{}: {}", origin_, line, problem)};
+  }
+  [[noreturn]] void refuse(const char* element, const std::string& name, const std::string& problem,
+                           Code code = Code::kInvalidArgument) const {
+    refuse_at(line_of(element, name), fmt::format("<{} name=\"{}\">: {}", element, name, problem), code);
+  }
+  int line_of(const char* element, const std::string& name) const {
     const auto line = lines_.find({element, name});
-    throw yaml::Malformed{fmt::format("{}:{}: <{} name=\"{}\">: {}", origin_, line == lines_.end() ? 1 : line->second,
-                                      element, name, problem)};
+    return line == lines_.end() ? 1 : line->second;
   }
 
-  void add_link(const urdf::Link& from, int parent, const urdf::Joint* by) {
+  // What validate() says, "robot.links[2] ('elbow')…", with the line of the link or joint.
+  Error located(const Error& error) const {
+    const std::string& message = error.message;
+    const std::size_t begin = message.find("('"), end = message.find("')");
+    const std::string name = end < message.npos ? message.substr(begin + 2, end - begin - 2) : "";
+    const int line = line_of(message.starts_with("robot.links") ? "link" : "joint", name);
+    return {error.code, fmt::format("{}:{}: {}", origin_, line, message)};
+  }
+
+  // What the parser would refuse without a line.
+  void check_joints(const XMLElement& robot) {
+    static const std::set<std::string> kTypes{"revolute", "continuous", "prismatic", "fixed"};
+    for (const auto* joint = robot.FirstChildElement("joint"); joint; joint = joint->NextSiblingElement("joint")) {
+      const std::string name = attribute(joint, "name"), type = attribute(joint, "type");
+      if (!kTypes.contains(type)) {
+        refuse("joint", name,
+               fmt::format(
+                   "got type '{}', wanted {}; remedy: write a planar joint as two prismatic and a continuous one, and "
+                   "place a floating robot by robot.base of the scene",
+                   type, fmt::join(kTypes, ", ")));
+      }
+      for (const char* end : {"parent", "child"}) {
+        const std::string link = attribute(joint->FirstChildElement(end), "link");
+        if (!lines_.contains({"link", link})) {
+          refuse("joint", name,
+                 fmt::format("<{} link>: got '{}', wanted the name of a <link> of this file", end, link));
+        }
+      }
+      const std::string child = attribute(joint->FirstChildElement("child"), "link");
+      if (!children_.insert(child).second) {
+        refuse("joint", name,
+               fmt::format("<child link>: got '{}', which hangs on another joint; wanted each link once", child));
+      }
+      const XMLElement* limit = joint->FirstChildElement("limit");
+      if (!limit && (type == "revolute" || type == "prismatic")) {
+        refuse("joint", name, "got no <limit>, wanted one with lower, upper, effort and velocity");
+      }
+      for (const char* key : {"effort", "velocity"}) {
+        if (limit && !limit->Attribute(key)) refuse("joint", name, fmt::format("<limit>: got no {}, wanted one", key));
+      }
+    }
+  }
+
+  void check_root(const XMLElement& robot) const {
+    std::string root;
+    for (const auto* link = robot.FirstChildElement("link"); link; link = link->NextSiblingElement("link")) {
+      const std::string name = attribute(link, "name");
+      if (children_.contains(name)) continue;
+      if (!root.empty()) {
+        refuse(
+            "link", name,
+            fmt::format("got two roots, this and '{}', wanted one tree; remedy: hang one on the other by a fixed joint",
+                        root));
+      }
+      root = name;
+    }
+    if (root.empty()) refuse_at(robot.GetLineNum(), "<robot>: got no root, wanted a <link> that is no joint's child");
+  }
+
+  void check_reach() const {
+    for (const auto& [key, line] : lines_) {
+      if (key.first != "link" || std::ranges::find(model_.links, key.second, &Link::name) != model_.links.end())
+        continue;
+      refuse("link", key.second,
+             "got a circle of joints, wanted links that hang on the root '" + model_.links[0].name + "'");
+    }
+  }
+
+  // The parser leaves out what it cannot read of a link, and goes on.
+  void check_whole(const urdf::Link& link) const {
+    const auto parts = parts_.find(link.name);
+    if (parts == parts_.end() || (parts->second.collisions == link.collision_array.size() &&
+                                  parts->second.has_inertial == static_cast<bool>(link.inertial))) {
+      return;
+    }
+    refuse(
+        "link", link.name,
+        "the URDF parser could not read all of its <inertial>, <visual> and <collision>, for the reason above; wanted "
+        "what wiki.ros.org/urdf/XML/link describes");
+  }
+
+  // `moves`: whether what it hangs on does.
+  void add_link(const urdf::Link& from, int parent, const urdf::Joint* by, bool moves) {
+    check_whole(from);
     Link link{.name = from.name, .parent = parent};
     if (by) {
       link.pose = from_urdf(by->parent_to_joint_origin_transform);
       add_joint(*by, link);
     }
-    if (from.inertial) {
+    moves = moves || !link.joints.empty();
+    // The weight of what never moves is nobody's concern, and often made up.
+    if (from.inertial && moves) {
       const urdf::Inertial& inertial = *from.inertial;
       link.inertia =
           Inertia{.mass = inertial.mass,
@@ -82,13 +206,13 @@ class Reader {
       if (!(inertial.mass > 0)) link.inertia.reset();
     }
     if (!link.joints.empty() && !link.inertia) {
-      refuse("link", from.name, "it moves and has no <inertial> with a mass above 0; remedy: add one");
+      refuse("link", from.name, "got no <inertial> with a mass above 0, wanted one: it moves; remedy: add it");
     }
     for (const auto& collision : from.collision_array) add_geom(from, *collision, link);
     const int index = static_cast<int>(model_.links.size());
     model_.links.push_back(std::move(link));
     for (const auto& joint : from.child_joints) {
-      add_link(*urdf_->getLink(joint->child_link_name), index, joint.get());
+      add_link(*urdf_->getLink(joint->child_link_name), index, joint.get(), moves);
     }
   }
 
@@ -105,10 +229,7 @@ class Reader {
         joint.kind = JointKind::kSlide;
         break;
       default:
-        refuse(
-            "joint", from.name,
-            "its type is not supported, wanted revolute, continuous, prismatic or fixed; remedy: write a planar joint "
-            "as two prismatic and a continuous one, and place a floating robot by robot.base of the scene");
+        refuse("joint", from.name, "got a type that is not supported");  // check_joints saw it first
     }
     const double length = std::hypot(from.axis.x, from.axis.y, from.axis.z);
     if (!(length > 0)) refuse("joint", from.name, "<axis>: got length 0, wanted a direction");
@@ -120,13 +241,20 @@ class Reader {
       if (from.type != urdf::Joint::CONTINUOUS) {
         joint.low = from.limits->lower;
         joint.high = from.limits->upper;
-        if (!(joint.low <= joint.high)) {
-          refuse("joint", from.name, fmt::format("<limit>: got lower {} above upper {}", joint.low, joint.high));
+        if (!(joint.low < joint.high)) {
+          refuse(
+              "joint", from.name,
+              fmt::format("<limit>: got lower {} and upper {}, wanted lower below upper; remedy: type continuous for a "
+                          "joint that turns for ever, fixed for one that does not move",
+                          joint.low, joint.high));
         }
       }
     }
-    if (!(effort > 0))
-      refuse("joint", from.name, fmt::format("<limit effort>: got {}, wanted more than 0 N or N m", effort));
+    if (!(effort > 0)) {
+      refuse("joint", from.name,
+             fmt::format("<limit effort>: got {}, wanted more than 0 N or N m; remedy: the strength of its drive",
+                         effort));
+    }
     joint.armature = std::max(kLeastArmature, effort / kAcceleration);
     joint.gain = kGainOfArmature * joint.armature;
     joint.force_limit = effort;
@@ -139,7 +267,9 @@ class Reader {
       return;
     }
     if (!(velocity > 0)) {
-      refuse("joint", from.name, fmt::format("<limit velocity>: got {}, wanted more than 0 rad/s or m/s", velocity));
+      refuse("joint", from.name,
+             fmt::format("<limit velocity>: got {}, wanted more than 0 rad/s or m/s; remedy: the speed of its drive",
+                         velocity));
     }
     model_.axes.push_back({.name = from.name, .joints = {{index, 1.0}}, .limit = std::min(velocity, kFastestJoint)});
   }
@@ -151,6 +281,11 @@ class Reader {
       if (axis == model_.axes.end()) {
         refuse("joint", joint.name,
                fmt::format("<mimic joint>: got '{}', wanted a joint that moves by itself", mimic.joint_name));
+      }
+      if (!(std::isfinite(mimic.multiplier) && mimic.multiplier != 0)) {
+        refuse("joint", joint.name,
+               fmt::format("<mimic multiplier>: got {}, wanted a number that is not 0; remedy: type fixed",
+                           mimic.multiplier));
       }
       axis->joints.emplace_back(follower, mimic.multiplier);
       const Joint& leader = model_.joints[static_cast<std::size_t>(axis->joints[0].first)];
@@ -190,43 +325,59 @@ class Reader {
 
   void read_mesh(const urdf::Link& from, const urdf::Mesh& mesh, RobotGeom& geom) {
     geom.shape = GeomShape::kMesh;
-    auto vertices_result = mesh_vertices(find_mesh(from, mesh.filename));
-    if (!vertices_result) refuse("link", from.name, "<mesh>: " + vertices_result.error().message);
-    geom.vertices = std::move(vertices_result).value();
     const std::array<double, 3> scale{mesh.scale.x, mesh.scale.y, mesh.scale.z};
+    if (!(scale[0] * scale[1] * scale[2] > 0)) {
+      refuse("link", from.name,
+             fmt::format(
+                 "<mesh scale>: got {}, which mirrors the mesh or flattens it, wanted positive factors; remedy: mirror "
+                 "the file",
+                 fmt::join(scale, " ")));
+    }
+    auto vertices_result = mesh_vertices(find_mesh(from, mesh.filename));
+    if (!vertices_result)
+      refuse("link", from.name, "<mesh>: " + vertices_result.error().message, vertices_result.error().code);
+    geom.vertices = std::move(vertices_result).value();
     for (std::size_t i = 0; i < geom.vertices.size(); ++i) geom.vertices[i] *= scale[i % 3];
   }
 
   fs::path find_mesh(const urdf::Link& from, const std::string& name) const {
     constexpr std::string_view kPackage = "package://", kFile = "file://";
+    const fs::path here = fs::absolute(origin_).lexically_normal().parent_path();
     std::vector<fs::path> candidates;
     if (name.starts_with(kPackage)) {
       const fs::path rest = name.substr(kPackage.size());
       for (const fs::path& folder : path_.folders) candidates.push_back(folder / rest);
       // A package that is no folder of the search path, but around this file.
-      for (fs::path folder = fs::path(origin_).parent_path(); !folder.empty() && folder != folder.parent_path();
-           folder = folder.parent_path()) {
+      for (fs::path folder = here; folder != folder.parent_path(); folder = folder.parent_path()) {
         candidates.push_back(folder.parent_path() / rest);
       }
     } else if (name.starts_with(kFile)) {
       candidates.emplace_back(name.substr(kFile.size()));
     } else {
-      candidates.push_back(fs::path(origin_).parent_path() / name);
+      candidates.push_back(here / name);
     }
     for (const fs::path& candidate : candidates) {
-      if (fs::is_regular_file(candidate)) return candidate;
+      std::error_code ignored;  // a name that no file can have is a name of no file
+      if (fs::is_regular_file(candidate, ignored)) return candidate;
     }
     std::vector<std::string> tried;
     for (const fs::path& candidate : candidates) tried.push_back(candidate.string());
     refuse("link", from.name,
            fmt::format(
                "<mesh filename=\"{}\">: no such file; looked for {}; JOSTLE_MODELS or ROS_PACKAGE_PATH add folders",
-               name, fmt::join(tried, ", ")));
+               name, fmt::join(tried, ", ")),
+           Code::kNotFound);
   }
 
   const std::string& origin_;
   const RobotPath& path_;
   std::map<std::pair<std::string, std::string>, int> lines_;  // by element and name
+  struct Parts {
+    bool has_inertial = false;
+    std::size_t collisions = 0;
+  };
+  std::map<std::string, Parts> parts_;  // what the file has of a link
+  std::set<std::string> children_;      // links that hang on a joint
   urdf::ModelInterfaceSharedPtr urdf_;
   RobotModel model_;
   std::vector<std::pair<int, urdf::JointMimic>> mimics_;
@@ -236,12 +387,9 @@ class Reader {
 
 Result<RobotModel> parse_urdf(const std::string& xml, const std::string& origin, const RobotPath& path) {
   try {
-    RobotModel model = Reader(xml, origin, path).read();
-    if (auto ok = validate(model); !ok)
-      return Error{ok.error().code, fmt::format("{}: {}", origin, ok.error().message)};
-    return model;
-  } catch (const yaml::Malformed& malformed) {
-    return Error{Code::kInvalidArgument, malformed.message};
+    return Reader(xml, origin, path).read();
+  } catch (const Error& error) {
+    return error;
   }
 }
 

@@ -135,7 +135,7 @@ void write_fixture(Writer& xml, const Fixture& fixture) {
       fixture.shape == Shape::kBox
           ? fmt::format(R"(type="box" size="{} {} {}")", fixture.size[0] / 2, fixture.size[1] / 2, fixture.size[2] / 2)
           : fmt::format(R"(type="cylinder" size="{} {}")", fixture.radius, fixture.height / 2);
-  xml.line(R"(<geom name="{}" {} {} rgba="0.6 0.5 0.4 0.5" contype="{}" conaffinity="0" user="{}"/>)",
+  xml.line(R"(<geom name="{}{}" {} {} rgba="0.6 0.5 0.4 0.5" contype="{}" conaffinity="0" user="{}"/>)", kGeomPrefix,
            quoted(fixture.name), size, pose_text(fixture.pose), kSupport | kWall, kFixtureMark);
 }
 
@@ -174,8 +174,9 @@ void write_geom(Writer& xml, const RobotGeom& geom, bool has_mass, int& mesh) {
       break;
   }
   xml.line(R"(<geom{} {} {}{} material="{}" contype="{}" conaffinity="{}" user="{}"/>)",
-           geom.name.empty() ? "" : fmt::format(R"( name="{}")", quoted(geom.name)), shape, pose_text(geom.pose),
-           has_mass ? fmt::format(R"( mass="{}")", geom.mass) : "", geom.material, kRobot, kWall, kRobotMark);
+           geom.name.empty() ? "" : fmt::format(R"( name="{}{}")", kGeomPrefix, quoted(geom.name)), shape,
+           pose_text(geom.pose), has_mass ? fmt::format(R"( mass="{}")", geom.mass) : "", geom.material, kRobot, kWall,
+           kRobotMark);
 }
 
 // xx, yy, zz, xy, xz, yz along the link's axes: the engine takes a full matrix in no other frame.

@@ -9,8 +9,10 @@
 
 namespace jostle::physics_pool {
 
-/// Stands before the names of the robot's bodies: URDF files often have a link "world", a name that the engine uses.
+/// What stands before the names of the robot's bodies, and before those of its geoms and of fixtures: URDF files like
+/// to have a link "world", which is the engine's own, and the scene has geoms of its own.
 inline constexpr const char* kLinkPrefix = "link:";
+inline constexpr const char* kGeomPrefix = "geom:";
 
 /// Says which parts of a scene go into a model.
 struct ModelContent {

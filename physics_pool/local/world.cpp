@@ -60,7 +60,11 @@ Result<void> check_start(const World& world) {
       return fmt::format("object '{}'", scene.objects[static_cast<std::size_t>(geom - first_object)].name);
     const char* known = mj_id2name(&model, mjOBJ_GEOM, geom);
     const char* body = mj_id2name(&model, mjOBJ_BODY, model.geom_bodyid[geom]);
-    if (known) return fmt::format("'{}'", known);
+    if (known) {
+      std::string_view plain = known;
+      if (plain.starts_with(kGeomPrefix)) plain.remove_prefix(std::strlen(kGeomPrefix));
+      return fmt::format("'{}'", plain);
+    }
     return fmt::format("robot link '{}'", body ? std::string_view(body).substr(std::strlen(kLinkPrefix)) : "?");
   };
   for (int i = 0; i < data->ncon; ++i) {

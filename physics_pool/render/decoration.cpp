@@ -43,13 +43,13 @@ void add_pad(const mjModel& model, const mjData& data, const char* finger, mjvSc
 }
 
 void add_wrist(const mjModel& model, const mjData& data, mjvScene& scene) {
-  const int palm_geom = mj_name2id(&model, mjOBJ_GEOM, "palm");
+  const int palm_geom = mj_name2id(&model, mjOBJ_GEOM, "geom:palm");
   const int body = model.geom_bodyid[palm_geom];
   const mjtNum* position = data.xpos + 3 * body;
   const mjtNum* rotation = data.xmat + 9 * body;
   // Half sizes of the palm and of what is behind it.
   const mjtNum* palm = model.geom_size + 3 * palm_geom;
-  const mjtNum* arm = model.geom_size + 3 * mj_name2id(&model, mjOBJ_GEOM, "arm");
+  const mjtNum* arm = model.geom_size + 3 * mj_name2id(&model, mjOBJ_GEOM, "geom:arm");
   const double top = palm[2], wrist = -2 * palm[0], elbow = wrist - 2 * arm[0];
   const auto cap = [&](double x, double radius, double half_height, const Colour& colour) {
     add(position, rotation, {mjGEOM_CYLINDER, {radius, half_height, 0}, {x, 0, top}, colour}, scene);
@@ -76,11 +76,11 @@ void decorate(const SceneTask& task, const mjModel& model, const mjData& data, m
   if (const TaskKind* kind = find_task_kind(task.kind); kind && kind->has_goal)
     add_disc(task.goal, 0.001, kGoalColour, scene);
   if (task.obstacle) add_disc(*task.obstacle, 0.002, kObstacleColour, scene);
-  for (const char* part : {"palm", "arm", "finger_left", "finger_right"}) {
+  for (const char* part : {"geom:palm", "geom:arm", "geom:finger_left", "geom:finger_right"}) {
     if (mj_name2id(&model, mjOBJ_GEOM, part) < 0) return;
   }
-  add_pad(model, data, "finger_left", scene);
-  add_pad(model, data, "finger_right", scene);
+  add_pad(model, data, "geom:finger_left", scene);
+  add_pad(model, data, "geom:finger_right", scene);
   add_wrist(model, data, scene);
 }
 

@@ -284,8 +284,7 @@ Result<RobotModel> builtin_robot(std::string_view name) {
     if (stem == name) return parse_robot(text, fmt::format("models/{}", file));
     known.push_back(stem);
   }
-  return Error{Code::kNotFound,
-               fmt::format("robot.model: got '{}', wanted {}, or a file", name, fmt::join(known, ", "))};
+  return Error{Code::kNotFound, fmt::format("got '{}', wanted {}, or a file", name, fmt::join(known, ", "))};
 }
 
 RobotPath robot_path(const fs::path& base) {
@@ -312,11 +311,10 @@ Result<RobotModel> find_robot(const std::string& name, const RobotPath& path) {
     }
     tried.push_back(folder.string());
   }
-  return Error{
-      Code::kNotFound,
-      fmt::format("robot.model: got '{}', wanted planar_gripper, pusher, or a file of that name (also with .yaml, "
-                  ".urdf or /robot.yaml) in: {}; JOSTLE_MODELS adds folders",
-                  name, fmt::join(tried, ", "))};
+  return Error{Code::kNotFound,
+               fmt::format("got '{}', wanted planar_gripper, pusher, or a file of that name (also with .yaml, "
+                           ".urdf or /robot.yaml) in: {}; JOSTLE_MODELS adds folders",
+                           name, fmt::join(tried, ", "))};
 }
 
 }  // namespace jostle::physics_pool

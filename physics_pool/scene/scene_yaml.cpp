@@ -34,6 +34,12 @@ void read_surface_1(Fields& surface, Scene& scene) {
   if (is_shelf) scene.fixtures = shelf_walls(scene.surface.parts[0], wall_height);
 }
 
+// In the words of format 1: what these numbers become has other names.
+void check_1(const Fields& fields, const char* key, double value, double low, double high) {
+  if (value >= low && value <= high) return;
+  fields.refuse(key, fmt::format("got {}, wanted {} to {} m", value, low, high));
+}
+
 void read_robot_1(Fields& fields, Scene& scene) {
   enum class Model { kGripper, kPusher } model = Model::kGripper;
   GripperStart gripper_start;
@@ -44,9 +50,12 @@ void read_robot_1(Fields& fields, Scene& scene) {
     start.optional("y", gripper_start.y);
     start.optional("rotation", gripper_start.rotation);
     start.optional("opening", gripper_start.opening);
+    check_1(start, "opening", gripper_start.opening, 0, 0.085);
   });
   fields.optional("radius", pusher_start.radius);
   fields.optional("height", pusher_start.height);
+  check_1(fields, "radius", pusher_start.radius, 0.002, 2);
+  check_1(fields, "height", pusher_start.height, 0.002, 2);
   pusher_start.x = gripper_start.x;
   pusher_start.y = gripper_start.y;
   scene.robot = model == Model::kPusher ? pusher(pusher_start) : planar_gripper(gripper_start);

@@ -41,7 +41,7 @@ struct Surface {
   /// Whether a point is in the surface less `margin` metres along its border. Where two parts meet there is no border.
   bool contains(double x, double y, double margin) const {
     if (std::ranges::any_of(parts, [&](const Rectangle& part) { return part.contains(x, y, margin); })) return true;
-    return parts.size() > 1 && covers(x - margin, x + margin, y - margin, y + margin, 0);
+    return parts.size() > 1 && margin > 0 && covers(x - margin, x + margin, y - margin, y + margin, 0);
   }
 
   /// The smallest rectangle around all parts.
@@ -62,7 +62,8 @@ struct Surface {
  private:
   // Whether the parts from number `first` on cover a rectangle: what the first leaves over must be covered by the rest.
   bool covers(double x0, double x1, double y0, double y1, std::size_t first) const {
-    if (x0 >= x1 || y0 >= y1) return true;
+    constexpr double kRounding = 1e-9;  // m; parts that meet may be 1e-17 m apart
+    if (x1 - x0 <= kRounding || y1 - y0 <= kRounding) return true;
     if (first == parts.size()) return false;
     const Rectangle& part = parts[first];
     const double in_x0 = std::clamp(part.low_x(), x0, x1), in_x1 = std::clamp(part.high_x(), x0, x1);

@@ -11,6 +11,7 @@
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/parareal/parareal_pool.hpp"
 #include "services/pool/client/remote_pool.hpp"
+#include "tests/support/arms.hpp"
 #include "tests/support/batches.hpp"
 #include "tests/support/planar.hpp"
 #include "tests/support/pushing.hpp"
@@ -30,6 +31,7 @@ struct Setting {
   Scene (*scene)(std::uint64_t seed);
   void (*before_goal)(const Scene& scene, RolloutBatch& batch);     // a step ends there, with luck
   void (*before_contact)(const Scene& scene, RolloutBatch& batch);  // a step meets an object
+  int ahead = kControlX;                                            // the axis that takes it to the target
 };
 
 const Setting kGripper{.scene = small_scene,
@@ -63,6 +65,23 @@ const Setting kPusher{
           batch.nominal.step(0)[kControlX] = 0.03;
         },
     .before_contact = [](const Scene&, RolloutBatch&) {}};  // the start is one
+
+// An arm of seven axes and a gripper, given as URDF: small velocities of its first axis push a box.
+const Setting kArm{.scene =
+                       [](std::uint64_t seed) {
+                         Scene scene = seven_axis_reach();
+                         scene.objects[2].yaw += 0.1 * static_cast<double>(seed);  // of the one that is out of the way
+                         return scene;
+                       },
+                   .before_goal =
+                       [](const Scene& scene, RolloutBatch& batch) {
+                         const auto target = static_cast<std::size_t>(layout_of(scene).objects[0].q);
+                         batch.x0.q[target] -= 0.048;  // 2 mm short of being reached
+                         batch.nominal.step(0)[kAxis1] = 0.0;
+                         batch.nominal.step(0)[kAxis4] = -0.03;  // half a metre from the tool
+                       },
+                   .before_contact = [](const Scene&, RolloutBatch&) {},  // the start is one
+                   .ahead = kAxis4};
 
 struct Implementation {
   const char* name;
@@ -262,7 +281,7 @@ TEST_P(EnginePoolContract, StoppingTheHopelessNeverChangesTheWinner) {
   RolloutBatch batch = push_batch(scene, 16);
   std::ranges::fill(batch.nominal.values, 0.0);
   batch.law.sigma.assign(batch.nominal.values.size(), 0.0);  // one step there or away, then rest
-  batch.law.sigma[kControlX] = 0.06;
+  batch.law.sigma[static_cast<std::size_t>(setting().ahead)] = 0.06;
   batch.stop_on_success = true;
   const BatchReply open = run(batch);
   ASSERT_GE(open.winner, 0);
@@ -511,6 +530,12 @@ INSTANTIATE_TEST_SUITE_P(OneWorker, PoolContract, kOneWorker, kName);
 INSTANTIATE_TEST_SUITE_P(OneWorker, EnginePoolContract, kOneWorker, kName);
 INSTANTIATE_TEST_SUITE_P(TwoWorkers, PoolContract, kTwoWorkers, kName);
 INSTANTIATE_TEST_SUITE_P(TwoWorkers, EnginePoolContract, kTwoWorkers, kName);
+const auto kArmOnThreads = ::testing::Values(Implementation{"arm_two_threads", 2, 0, false, &kArm});
+const auto kArmOnWorkers = ::testing::Values(Implementation{"arm_two_workers", 0, 2, false, &kArm});
+INSTANTIATE_TEST_SUITE_P(ArmOnThreads, PoolContract, kArmOnThreads, kName);
+INSTANTIATE_TEST_SUITE_P(ArmOnThreads, EnginePoolContract, kArmOnThreads, kName);
+INSTANTIATE_TEST_SUITE_P(ArmOnWorkers, PoolContract, kArmOnWorkers, kName);
+INSTANTIATE_TEST_SUITE_P(ArmOnWorkers, EnginePoolContract, kArmOnWorkers, kName);
 INSTANTIATE_TEST_SUITE_P(PararealOnThreads, PoolContract,
                          ::testing::Values(Implementation{"parareal_two_threads", 2, 0, true, &kPusher}), kName);
 INSTANTIATE_TEST_SUITE_P(PararealOnWorkers, PoolContract,

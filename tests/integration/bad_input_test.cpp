@@ -56,8 +56,8 @@ TEST_F(BadInput, SceneThatCannotBeIsRefusedWithFileFieldGotAndWanted) {
                    s.objects[1].y = s.objects[0].y;
                  })},
                  {spoilt, "objects[1]", "target", "can"});
-  expect_refused({scene_file([](Scene& s) { s.robot.model = "shoggoth"; })},
-                 {spoilt, "robot.model", "got 'shoggoth'", "wanted"});
+  expect_refused({scene_file([](Scene& s) { s.robot.model.joints[0].gain = -1; })},
+                 {spoilt, "robot.joints[0] ('gripper_x').gain", "got -1", "wanted"});
   expect_refused({scene_file([](Scene& s) { s.objects[2].mass = -0.5; })},
                  {spoilt, "objects[2]", "mass", "got -0.5", "wanted"});
   expect_refused({scene_file([](Scene& s) { s.objects[2].x = kNaN; })}, {spoilt, "objects[2]", "got", "wanted"});
@@ -107,11 +107,11 @@ TEST_F(BadInput, DomainWhosePortOfDiscoveryIsTakenIsRefusedWithPortAndRemedy) {
 
 TEST_F(BadInput, ArgumentsAreRefusedWithGotAndWanted) {
   expect_refused({easy, "--controller", "psychic"}, {"controller", "psychic", "or", "nr"});
-  expect_refused({easy, "--controller", "mpc"}, {"--controller", "got mpc for a task to grasp", "wanted or, nr"});
+  expect_refused({easy, "--controller", "mpc"}, {"--controller", "got 'mpc' for a task to grasp", "wanted or, nr"});
   expect_refused({folder.write("push.yaml", physics_pool::to_yaml(push_ahead())), "--controller", "nr"},
-                 {"--controller", "got nr for a task to push", "wanted mpc"});
+                 {"--controller", "got 'nr' for a task to push", "wanted mpc"});
   expect_refused({easy, "--predictor", "oracle"}, {"--predictor", "got 'oracle'", "wanted fine, coarse"});
-  expect_refused({easy, "--predictor", "parareal:1"}, {"--predictor", "robot.model", "wanted pusher"});
+  expect_refused({easy, "--predictor", "parareal:1"}, {"--predictor", "robot.model", "wanted a disc"});
   expect_refused({easy, "--uncertainty", "total"}, {"uncertainty", "total", "none, low, medium or high"});
   expect_refused({easy, "--pool", "swimming"}, {"pool", "swimming", "dds", "threads"});
   expect_refused({easy, "--workers", "-1"}, {"workers", "-1"});

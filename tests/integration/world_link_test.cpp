@@ -118,6 +118,7 @@ TEST_F(MadeUpWorld, RefusalIsOfOneCommandOnly) {
     RobotStatus status;
     status.q({0.0, 0.0});
     status.v({0.0, 0.0});
+    status.limits({2.0, 2.0});
     int repeats = 0;
     soon(kPatience, [&] {
       for (const VelocityCommand& command : commands.take_all()) {
@@ -153,6 +154,7 @@ TEST_F(MadeUpWorld, StopThatIsNotObeyedIsAnError) {
       RobotStatus status;
       status.q({0.0, 0.0});
       status.v({0.0, 0.0});
+      status.limits({2.0, 2.0});
       soon(kPatience, [&] {
         for (const VelocityCommand& command : commands.take_all()) {
           heard.push_back(command);

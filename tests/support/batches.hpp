@@ -26,9 +26,9 @@ inline physics_pool::RolloutBatch push_batch(const physics_pool::Scene& scene, s
   batch.x0 = physics_pool::initial_state(scene);
   const auto nu = static_cast<std::size_t>(physics_pool::layout_of(scene).nu);
   const auto axes = [nu](std::vector<double> values) {
-    values.resize(nu);
+    values.resize(nu, values.back());
     return values;
-  };  // a pusher has two
+  };  // a pusher has two, an arm more
   batch.nominal.nu = static_cast<int>(nu);
   for (int t = 0; t < 3; ++t) batch.nominal.append(axes({0.1, 0.0, 0.0, 0.0}));
   batch.u_before.assign(nu, 0.0);

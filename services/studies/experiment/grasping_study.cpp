@@ -128,7 +128,8 @@ Result<void> check(const GraspingStudy& study, const std::string& where) {
   if (!scene_result) return scene_result.error();
   for (const std::string& controller : study.controllers) {
     if (auto ok = planners::find_controller(controller, *scene_result); !ok) {
-      return Error{Code::kInvalidArgument, fmt::format("{}controllers: {}", where, ok.error().message)};
+      const std::string& message = ok.error().message;  // "controller: got …"
+      return Error{Code::kInvalidArgument, fmt::format("{}controllers{}", where, message.substr(message.find(':')))};
     }
   }
   return {};

@@ -112,9 +112,10 @@ TEST_F(AllocationTest, ScoringAStepAllocatesNothing) {
   b.q[6] += 0.3;
   const std::array<double, 4> u{0.1, 0, 0, 0}, none{};
   const Objective objective = Objective::standard();
+  const Scorer sut(objective);
   const long before = allocations;
-  const double cost = tests::running_cost(geometry, objective, none, u, a, b) +
-                      tests::goal_cost(geometry, b, objective.value("goal", "angle")) + at_goal(geometry, b, objective);
+  const double cost = sut.running({.geometry = geometry, .u_before = none, .u = u, .x0 = a, .x1 = b}) +
+                      sut.final(geometry, b) + sut.at_goal(geometry, b);
   EXPECT_EQ(allocations, before);
   EXPECT_GT(cost, 0.0);
 }

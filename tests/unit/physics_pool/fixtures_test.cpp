@@ -52,7 +52,6 @@ TEST(FixturesText, ReadsBackBitForBit) {
                                        {.position = {0.1 + 0.2, -1e-17, 0.5}, .orientation = {0.5, 0.5, -0.5, 0.5}}));
   scene.fixtures.push_back(post("post", 0.25, 0.4, 1.0 / 70.0));
   scene.fixtures.back().pose.orientation = turned_about_z(0.7);
-  scene.robot.base = {.position = {-0.1, 1.0 / 3.0, 0}, .orientation = turned_about_z(1.0 / 3.0)};
   ASSERT_TRUE(validate(scene, "scene")) << validate(scene, "scene").error().message;
   const auto again = parse_scene(to_yaml(scene), "again.yaml");
   ASSERT_TRUE(again) << again.error().message;
@@ -61,6 +60,14 @@ TEST(FixturesText, ReadsBackBitForBit) {
   EXPECT_EQ(again->robot, scene.robot);
   EXPECT_EQ(to_yaml(*again), to_yaml(scene));
   EXPECT_EQ(scene_hash(*again), scene_hash(scene));
+}
+
+TEST(FixturesText, KeepsAnArmsBaseBitForBit) {
+  Scene scene = two_links_reach();
+  scene.robot.base = {.position = {-0.4, 1.0 / 3.0, 0.1 + 0.2}, .orientation = turned_about_z(1.0 / 3.0)};
+  const auto again = parse_scene(to_yaml(scene), "again.yaml");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->robot, scene.robot);
 }
 
 const std::string kText = R"(jostle_scene: 2
@@ -74,7 +81,7 @@ fixtures:
     pose: {position: [0.2, 0.3, 0.3], yaw: 0.5}
   - {name: post, shape: cylinder, radius: 0.02, height: 0.2, pose: {position: [0, 0.05, 0.1]}}
 robot:
-  base: {position: [-0.1, 0, 0]}
+  model: planar_gripper
   start: {gripper_x: -0.4}
 objects:
   - {name: a, size: [0.04, 0.04, 0.04], mass: 0.5, friction: 0.4, pose: {x: 0.2, y: 0.3}}
@@ -89,7 +96,6 @@ TEST(FixturesText, IsShortForPeople) {
   Fixture board =
       box_fixture("board", {0.2, 0.1, 0.02}, {.position = {0.2, 0.3, 0.3}, .orientation = turned_about_z(0.5)});
   EXPECT_THAT(scene_result->fixtures, ElementsAre(board, post("post", 0, 0.05)));
-  EXPECT_THAT(scene_result->robot.base.position, ElementsAre(-0.1, 0, 0));
   EXPECT_EQ(scene_result->robot.q[kJointX], -0.4);
   EXPECT_EQ(scene_result->robot.q[kJointLeft], 0.0425);  // the model's own start
 }
@@ -153,9 +159,13 @@ INSTANTIATE_TEST_SUITE_P(
              "gripper_w",
              {"bad.yaml:13", "start", "got joint 'gripper_w'", "gripper_x"}},
         Case{"RobotThatThereIsNot",
-             "base: {",
-             "model: humanoid\n  base: {",
-             {"bad.yaml:12", "got 'humanoid'", "pusher"}}),
+             "model: planar_gripper",
+             "model: humanoid",
+             {"bad.yaml:12", "got 'humanoid'", "pusher"}},
+        Case{"BaseOfAPlanarRobot",
+             "model: planar_gripper",
+             "base: {position: [-0.1, 0, 0]}",
+             {"bad.yaml:12", "robot.base", "got a pose", "robot.start says where it is"}}),
     [](const auto& param) { return param.param.name; });
 
 TEST(ShelfWalls, StandRoundEverySideButTheRobots) {

@@ -239,7 +239,7 @@ TEST_P(LearnedModelMisfit, IsRefused) {
 INSTANTIATE_TEST_SUITE_P(
     , LearnedModelMisfit,
     testing::Values(Misfit{"Gripper", [](Scene& scene) { scene.robot = physics_pool::planar_gripper({}); },
-                           "robot.model: got planar_gripper, wanted pusher"},
+                           "robot.model: got planar_gripper, wanted a disc"},
                     Misfit{"OtherPusher", [](Scene& scene) { scene.robot = pusher({.radius = 0.02}); },
                            "robot.radius: got 0.02 m, wanted the 0.0145 m"},
                     Misfit{"NoSlider", [](Scene& scene) { scene.objects.clear(); }, "objects: got 0, wanted 1 to 4"},

@@ -325,7 +325,7 @@ TEST(PararealPool, RefusesWhatItCannotPredict) {
   PararealPool sut(threads, {});
   const auto no_pusher = sut.load(small_scene());
   ASSERT_FALSE(no_pusher);
-  EXPECT_THAT(no_pusher.error().message, HasSubstr("wanted pusher"));
+  EXPECT_THAT(no_pusher.error().message, HasSubstr("wanted a disc that moves in the plane"));
 }
 
 // An engine that loses every slice that starts where `lost` says.

@@ -62,14 +62,10 @@ TEST_P(MalformedPushScene, IsRefusedWithFileLineFieldGotAndWanted) {
 }
 
 const std::vector<Case> kCases{
-    {"PushWithAGripper",
-     "model: pusher",
-     "model: planar_gripper",
-     {"bad.yaml:11", "task.kind", "got 'push' for a planar_gripper", "push with a pusher"}},
     {"GraspWithAPusher",
      "kind: push",
      "kind: grasp",
-     {"bad.yaml:11", "task.kind", "got 'grasp' for a pusher", "grasp with a planar_gripper"}},
+     {"bad.yaml:11", "task.kind", "got 'grasp' for the robot 'pusher'", "which has no hand"}},
     {"UnknownRobot",
      "model: pusher",
      "model: broom",

@@ -135,6 +135,7 @@ TEST_P(EitherController, ReportsATimeoutBeforeAnActionAsAnOutcome) {
 TEST_P(EitherController, EndsWhenItsRolloutsAreSpent) {
   setup.limits.rollouts = 25;
   planner.predicts_goal = false;
+  robot.object_in_hand = false;  // whatever it does
   planner.change = [](Plan& plan, int) { plan.rollouts = 10; };
   const Outcome result = outcome();
   EXPECT_EQ(result.ending, Ending::kTimedOut);

@@ -16,7 +16,6 @@ using namespace std::chrono_literals;
 using bags::Playback;
 using bags::PlaybackOptions;
 using bags::Timeline;
-using bags::TimePoint;
 using std::chrono::nanoseconds;
 using ::testing::AllOf;
 using ::testing::ElementsAre;

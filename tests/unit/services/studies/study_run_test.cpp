@@ -137,9 +137,9 @@ TEST_F(GraspingStudyRun, HasARowPerCellAndAnEntryPerRun) {
       int successes = 0;
       for (const int seed : {1, 2}) {
         const json& run = result["runs"][place++];
-        EXPECT_THAT(keys_of(run), UnorderedElementsAre("seed", "level", "controller", "success", "reason", "plan_hash",
-                                                       "plan_seconds", "total_seconds", "replans", "actions",
-                                                       "rollouts", "execution_cost"));
+        EXPECT_THAT(keys_of(run), UnorderedElementsAre("seed", "level", "controller", "success", "ending", "reason",
+                                                       "plan_hash", "plan_seconds", "total_seconds", "replans",
+                                                       "actions", "rollouts", "execution_cost"));
         EXPECT_EQ(run["seed"], seed);
         EXPECT_EQ(run["level"], level);
         EXPECT_EQ(run["controller"], controller);
@@ -185,7 +185,8 @@ TEST_F(GraspingStudyRun, CommandLineChoosesSeedsLevelsAndControllers) {
   EXPECT_THAT(sut->run(some).error().message, HasSubstr("--levels: "));
   some.levels = {};
   some.controllers = {"psychic"};
-  EXPECT_THAT(sut->run(some).error().message, HasSubstr("--controllers: got 'psychic', wanted or, nr"));
+  EXPECT_THAT(sut->run(some).error().message,
+              HasSubstr("--controllers: got 'psychic' for a task to grasp, wanted or, nr"));
 }
 
 TEST_F(GraspingStudyRun, StopRequestEndsItWithCancelled) {
@@ -248,8 +249,8 @@ TEST_F(PushStudyRun, HasARowPerPredictorAndAnEntryPerRun) {
     double actions = 0;
     for (std::size_t seed = 0; seed < 2; ++seed) {
       const json& run = result["runs"][2 * seed + entry];  // scenes in the outer loop
-      EXPECT_THAT(keys_of(run), UnorderedElementsAre("seed", "predictor", "threads", "success", "reason", "actions",
-                                                     "rollouts", "planning_seconds"));
+      EXPECT_THAT(keys_of(run), UnorderedElementsAre("seed", "predictor", "threads", "success", "ending", "reason",
+                                                     "actions", "rollouts", "planning_seconds"));
       EXPECT_EQ(run["seed"], seed + 1);
       EXPECT_EQ(run["predictor"], predictor);
       EXPECT_FALSE(run["reason"].get<std::string>().empty());

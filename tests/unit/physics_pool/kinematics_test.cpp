@@ -5,7 +5,6 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <functional>
 #include <numbers>
 #include <random>
 #include <string>
@@ -147,7 +146,14 @@ Scene alone(RobotModel model) {
   return scene;
 }
 
-class Engine : public testing::TestWithParam<std::function<RobotModel()>> {
+struct Robot {
+  const char* name;
+  RobotModel (*model)();
+};
+
+void PrintTo(const Robot& value, std::ostream* out) { *out << value.name; }
+
+class Engine : public testing::TestWithParam<Robot> {
  protected:
   void at(const std::vector<double>& q) {
     std::ranges::copy(q, data->qpos);
@@ -169,7 +175,7 @@ class Engine : public testing::TestWithParam<std::function<RobotModel()>> {
   // Body 0 is the world; of these robots every link is followed by its children.
   static int body_of(std::size_t link) { return static_cast<int>(link) + 1; }
 
-  const RobotModel model = GetParam()();
+  const RobotModel model = GetParam().model();
   const WorldPtr world = compiled(alone(model));
   const DataPtr data{mj_makeData(world->model())};
   std::mt19937 random{5};
@@ -228,12 +234,13 @@ TEST_P(Engine, HasTheToolWhereItIs) {
   expect_near(tool_pose(geometry, x), wanted, 1e-12);
 }
 
-const std::vector<std::string> kNames{"PlanarGripper", "Pusher", "TwoLinks", "SevenAxis"};
+const std::vector<Robot> kRobots{{"PlanarGripper", [] { return builtin_robot("planar_gripper").value(); }},
+                                 {"Pusher", [] { return builtin_robot("pusher").value(); }},
+                                 {"TwoLinks", two_links},
+                                 {"SevenAxis", seven_axis}};
 
-INSTANTIATE_TEST_SUITE_P(Robots, Engine,
-                         testing::Values([] { return builtin_robot("planar_gripper").value(); },
-                                         [] { return builtin_robot("pusher").value(); }, two_links, seven_axis),
-                         [](const auto& param) { return kNames.at(param.index); });
+INSTANTIATE_TEST_SUITE_P(Robots, Engine, testing::ValuesIn(kRobots),
+                         [](const auto& param) { return std::string(param.param.name); });
 
 // A hinge along z through a link that weighs 2 kg, 0.3 m off the axis. About it: R M R^T's zz, by Steiner m d^2 more.
 TEST(EngineInertia, IsThatOfTheLinkHoweverItsFrameIsTurned) {

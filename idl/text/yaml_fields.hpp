@@ -45,8 +45,8 @@ inline int line_of(YAML::Node node, std::string_view field) {
 /// One mapping of a file: hands out its fields and knows which were asked for.
 class Fields {
  public:
-  Fields(YAML::Node node, std::string path, const std::string& origin)
-      : node_(std::move(node)), path_(std::move(path)), origin_(origin) {
+  Fields(const YAML::Node& node, std::string path, const std::string& origin)
+      : node_(node), path_(std::move(path)), origin_(origin) {
     if (!node_.IsMap()) {
       fail(node_, path_.empty() ? "file" : path_,
            fmt::format("got {}, wanted a mapping of keys to values", describe(node_)));

@@ -205,7 +205,7 @@ Result<void> validate(const Objective& objective) {
     const TermKind* kind = find_term_kind(term.kind);
     if (!kind) {
       std::vector<std::string_view> known;
-      for (const TermKind* k : term_catalogue()) known.push_back(k->name);
+      for (const TermKind* k : term_catalogue()) known.emplace_back(k->name);
       return invalid("objective.terms", "'" + term.kind + "'", fmt::format("one of: {}", fmt::join(known, ", ")));
     }
     if (!seen.insert(term.kind).second) return invalid("objective." + term.kind, "it twice", "it once");

@@ -15,7 +15,7 @@ bool is_finite(std::span<const double> values) {
 
 }  // namespace
 
-PararealIteration::PararealIteration(const PlanarUpdate& update, CoarseModel& coarse, State x0,
+PararealIteration::PararealIteration(const PlanarUpdate& update, CoarseModel& coarse, const State& x0,
                                      ControlSequence controls, double duration, const PararealStop& stop)
     : update_(update),
       coarse_(coarse),

@@ -46,7 +46,7 @@ class PararealIteration {
   };
 
   /// `update` and `coarse` must outlive it. x0 and `controls` [N][2]; duration in s.
-  PararealIteration(const PlanarUpdate& update, CoarseModel& coarse, State x0, ControlSequence controls,
+  PararealIteration(const PlanarUpdate& update, CoarseModel& coarse, const State& x0, ControlSequence controls,
                     double duration, const PararealStop& stop);
 
   /// Level 0 is made step by step, so that C may serve many trajectories at once: N times,
@@ -82,7 +82,7 @@ class PararealIteration {
   void begin();
   void know(int k, State x);
   void open_slice(int k, std::size_t n);
-  void take_coarse(Level& level, std::size_t n, std::vector<double> planar, int k);
+  void take_coarse(Level& here, std::size_t n, std::vector<double> planar, int k);
   void fill();
   void judge(int k);
 

@@ -263,7 +263,7 @@ class Reader {
     link.joints.push_back(index);
     model_.joints.push_back(joint);
     if (from.mimic) {
-      mimics_.push_back({index, *from.mimic});
+      mimics_.emplace_back(index, *from.mimic);
       return;
     }
     if (!(velocity > 0)) {
@@ -361,6 +361,7 @@ class Reader {
       if (fs::is_regular_file(candidate, ignored)) return candidate;
     }
     std::vector<std::string> tried;
+    tried.reserve(candidates.size());
     for (const fs::path& candidate : candidates) tried.push_back(candidate.string());
     refuse("link", from.name,
            fmt::format(

@@ -155,7 +155,9 @@ TEST_P(PlannerContract, CostIsNeverWorseThanTheInitialControls) {
     const Plan plan = planned(problem);
 
     EXPECT_LE(plan.cost, bowl.cost(problem.initial)) << "seed " << seed;
-    if (seed == 0) EXPECT_EQ(plan.controls, problem.initial);
+    if (seed == 0) {
+      EXPECT_EQ(plan.controls, problem.initial);
+    }
   }
 }
 

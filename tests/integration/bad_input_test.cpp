@@ -68,7 +68,7 @@ TEST_F(BadInput, SceneThatCannotBeIsRefusedWithFileFieldGotAndWanted) {
 
 TEST_F(BadInput, SceneToolEndsWithTwoOnABadFileAndWithOneWhenItCannotWrite) {
   const std::string broken = folder.write("broken.yaml", "jostle_scene: [1, 2\n");
-  for (const std::string file : {broken, (folder.path() / "missing.yaml").string()}) {
+  for (const std::string& file : {broken, (folder.path() / "missing.yaml").string()}) {
     for (const char* command : {"check", "show", "perturb"}) {
       const auto tool = program("jostle_scene", {command, file});
       EXPECT_EQ(tool->wait(kPatience), 2) << command;

@@ -70,12 +70,12 @@ TEST_F(RecordedRuns, OfBeforeAreDecidedTheSameAgain) {
 
     const int code = program_ends("jostle_replay", {old_bag, "--json", comparison_file});
 
-    const json run = json::parse(contents(comparison_file))["runs"][0];
-    EXPECT_GE(run["plans"], 6) << name;
+    const json decided = json::parse(contents(comparison_file))["runs"][0];
+    EXPECT_GE(decided["plans"], 6) << name;
     if (!has_fma()) continue;  // the last bits of these recordings are those of processors that have it
     EXPECT_EQ(code, 0) << out << err;
-    EXPECT_EQ(run["equal_plans"], run["plans"]) << name;
-    EXPECT_EQ(run["equal_actions"], run["actions"]) << name;
+    EXPECT_EQ(decided["equal_plans"], decided["plans"]) << name;
+    EXPECT_EQ(decided["equal_actions"], decided["actions"]) << name;
   }
 }
 

@@ -374,13 +374,13 @@ TEST(ValidateObjective, NamesWhatIsWrong) {
 
 // What an arm does to a shelf is a fact of contact, which no state tells (Eq. 4.36).
 TEST_F(ObjectiveTerms, ContactCountsStepsThatHitAFixture) {
-  Objective objective;
-  objective["contact"].weight = 3;
+  Objective contact;
+  contact["contact"].weight = 3;
   const std::vector<double> u(4, 0.0);
   Step step{.geometry = geometry, .u_before = u, .u = u, .x0 = start, .x1 = start};
-  EXPECT_EQ(Scorer(objective).running(step), 0.0);
+  EXPECT_EQ(Scorer(contact).running(step), 0.0);
   step.facts.robot_hit_fixture = true;
-  EXPECT_EQ(Scorer(objective).running(step), 3.0);
+  EXPECT_EQ(Scorer(contact).running(step), 3.0);
 }
 
 }  // namespace

@@ -386,7 +386,7 @@ Result<void> validate(const Scene& scene, const Locate& locate) {
   const TaskKind* kind = find_task_kind(scene.task.kind);
   if (!kind) {
     std::vector<std::string> known;
-    for (const TaskKind* k : task_kinds()) known.push_back(k->name);
+    for (const TaskKind* k : task_kinds()) known.emplace_back(k->name);
     return invalid(locate, {"task.kind", "task.kind"},
                    fmt::format("got '{}', wanted one of: {}", scene.task.kind, fmt::join(known, ", ")));
   }

@@ -16,7 +16,6 @@ namespace jostle::physics_pool {
 namespace {
 
 using yaml::Fields;
-using yaml::Malformed;
 
 void read_disc(Fields& fields, Disc& disc) {
   fields.required("x", disc.x);

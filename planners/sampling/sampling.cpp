@@ -7,7 +7,6 @@
 
 namespace jostle::planners {
 
-using physics_pool::BatchReply;
 using physics_pool::RolloutBatch;
 using Method = SamplingOptions::Method;
 

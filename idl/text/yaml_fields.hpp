@@ -8,6 +8,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <array>
+#include <charconv>
 #include <initializer_list>
 #include <set>
 #include <string>
@@ -29,12 +30,14 @@ struct Malformed {
 /// the field out, it is the line of the nearest part around it.
 inline int line_of(YAML::Node node, std::string_view field) {
   int line = node.Mark().line + 1;
-  while (!field.empty()) {
+  while (!field.empty() && (node.IsMap() || node.IsSequence())) {
     const std::size_t end = field.find_first_of(".[");
     const std::string key(field.substr(0, end));
     field = end == field.npos ? "" : field.substr(end + 1);
-    const bool is_index = key.back() == ']';
-    const YAML::Node next = is_index ? node[std::stoul(key)] : node[key];
+    std::size_t index = 0;
+    const auto [rest, problem] = std::from_chars(key.data(), key.data() + key.size(), index);
+    const bool is_index = problem == std::errc() && *rest == ']';  // names, too, may have brackets
+    const YAML::Node next = is_index ? node[index] : node[key];
     if (!next) break;
     node.reset(next);
     line = node.Mark().line + 1;

@@ -87,7 +87,6 @@ class Reader {
     model_.name = urdf_->getName();
     model_.carries_itself = true;
     add_link(*urdf_->getRoot(), -1, nullptr, false);
-    check_reach();
     add_mimics();
     if (auto ok = validate(model_); !ok) throw located(ok.error());
     return std::move(model_);
@@ -135,7 +134,7 @@ class Reader {
         }
       }
       const std::string child = attribute(joint->FirstChildElement("child"), "link");
-      if (!children_.insert(child).second) {
+      if (!parents_.try_emplace(child, attribute(joint->FirstChildElement("parent"), "link")).second) {
         refuse("joint", name,
                fmt::format("<child link>: got '{}', which hangs on another joint; wanted each link once", child));
       }
@@ -153,7 +152,7 @@ class Reader {
     std::string root;
     for (const auto* link = robot.FirstChildElement("link"); link; link = link->NextSiblingElement("link")) {
       const std::string name = attribute(link, "name");
-      if (children_.contains(name)) continue;
+      if (parents_.contains(name)) continue;
       if (!root.empty()) {
         refuse(
             "link", name,
@@ -163,14 +162,19 @@ class Reader {
       root = name;
     }
     if (root.empty()) refuse_at(robot.GetLineNum(), "<robot>: got no root, wanted a <link> that is no joint's child");
+    check_circles(root);
   }
 
-  void check_reach() const {
-    for (const auto& [key, line] : lines_) {
-      if (key.first != "link" || std::ranges::find(model_.links, key.second, &Link::name) != model_.links.end())
-        continue;
-      refuse("link", key.second,
-             "got a circle of joints, wanted links that hang on the root '" + model_.links[0].name + "'");
+  // The parser would leave such links out without a word, and never free them.
+  void check_circles(const std::string& root) const {
+    for (const auto& [child, parent] : parents_) {
+      std::string link = child;
+      for (std::size_t steps = 0; link != root; ++steps) {
+        if (steps == parents_.size()) {
+          refuse("link", child, "got a circle of joints, wanted links that hang on the root '" + root + "'");
+        }
+        link = parents_.at(link);
+      }
     }
   }
 
@@ -377,8 +381,8 @@ class Reader {
     bool has_inertial = false;
     std::size_t collisions = 0;
   };
-  std::map<std::string, Parts> parts_;  // what the file has of a link
-  std::set<std::string> children_;      // links that hang on a joint
+  std::map<std::string, Parts> parts_;          // what the file has of a link
+  std::map<std::string, std::string> parents_;  // of links that hang on a joint
   urdf::ModelInterfaceSharedPtr urdf_;
   RobotModel model_;
   std::vector<std::pair<int, urdf::JointMimic>> mimics_;

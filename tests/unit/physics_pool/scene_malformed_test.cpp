@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "idl/text/yaml_fields.hpp"
 #include "physics_pool/scene/scene.hpp"
 #include "tests/support/scenes.hpp"
 
@@ -228,6 +229,15 @@ TEST(ParseScene, RefusesOtherRoots) {
     EXPECT_THAT(scene.error().message, HasSubstr("root.yaml:1"));
     EXPECT_THAT(scene.error().message, HasSubstr("wanted a mapping"));
   }
+}
+
+// A joint may be called "b[c]": the line of its field is looked for all the same.
+TEST(LineOf, IsThatOfTheNearestPartForNamesWithBrackets) {
+  const YAML::Node root = YAML::Load("a:\n  - 1\n  - {b: 2}\n");
+  EXPECT_EQ(yaml::line_of(root, "a[1].b"), 3);
+  EXPECT_EQ(yaml::line_of(root, "a[1].b[c]"), 3);
+  EXPECT_EQ(yaml::line_of(root, "a[9].b"), 2);
+  EXPECT_EQ(yaml::line_of(root, "z..[]"), 1);
 }
 
 TEST(ParseScene, RefusesKeysThatAreNotText) {

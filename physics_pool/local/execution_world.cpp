@@ -2,13 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "physics_pool/local/engine.hpp"
 
 namespace jostle::physics_pool {
 
 ExecutionWorld::ExecutionWorld(WorldPtr world, const VelocityNoise& noise)
-    : simulator_(world), noise_(noise), state_(initial_state(world->scene())) {
-  begin(std::vector<double>(static_cast<std::size_t>(world->geometry().layout.nu), 0.0));
+    : simulator_(std::move(world)), noise_(noise), state_(initial_state(simulator_.world().scene())) {
+  begin(std::vector<double>(static_cast<std::size_t>(simulator_.world().geometry().layout.nu), 0.0));
 }
 
 void ExecutionWorld::begin(std::span<const double> u) {

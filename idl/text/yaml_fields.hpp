@@ -45,6 +45,13 @@ inline int line_of(YAML::Node node, std::string_view field) {
   return line;
 }
 
+/// Quotes a text as YAML (and JSON) do, so that any name survives.
+inline std::string quoted(const std::string& text) {
+  YAML::Emitter out;
+  out << YAML::DoubleQuoted << text;
+  return out.c_str();
+}
+
 /// One mapping of a file: hands out its fields and knows which were asked for.
 class Fields {
  public:

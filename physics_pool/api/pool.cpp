@@ -52,7 +52,7 @@ Result<std::vector<BatchReply>> AsyncPool::run_all(std::span<const RolloutBatch>
   const bool over = arrived.wait_until(lock, stop, deadline, [&] { return missing == 0 || failure; });
   lock.unlock();
   std::uint64_t unfinished = 0, samples = 0;
-  for (std::size_t i = 0; i < tickets.size(); ++i) {
+  for (std::size_t i = 0; !over && i < tickets.size(); ++i) {
     unfinished += tickets[i]->missing();
     samples += batches[i].samples;
   }

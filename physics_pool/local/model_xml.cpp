@@ -130,13 +130,18 @@ std::string pose_text(const Pose& pose) {
   return fmt::format(R"(pos="{}" quat="{}")", fmt::join(pose.position, " "), fmt::join(pose.orientation, " "));
 }
 
+// Of an object or a fixture.
+template <class Body>
+std::string shape_text(const Body& body) {
+  if (body.shape == Shape::kCylinder) {
+    return fmt::format(R"(type="cylinder" size="{} {}")", body.radius, body.height / 2);
+  }
+  return fmt::format(R"(type="box" size="{} {} {}")", body.size[0] / 2, body.size[1] / 2, body.size[2] / 2);
+}
+
 void write_fixture(Writer& xml, const Fixture& fixture) {
-  const std::string size =
-      fixture.shape == Shape::kBox
-          ? fmt::format(R"(type="box" size="{} {} {}")", fixture.size[0] / 2, fixture.size[1] / 2, fixture.size[2] / 2)
-          : fmt::format(R"(type="cylinder" size="{} {}")", fixture.radius, fixture.height / 2);
   xml.line(R"(<geom name="{}{}" {} {} rgba="0.6 0.5 0.4 0.5" contype="{}" conaffinity="0" user="{}"/>)", kGeomPrefix,
-           quoted(fixture.name), size, pose_text(fixture.pose), kSupport | kWall, kFixtureMark);
+           quoted(fixture.name), shape_text(fixture), pose_text(fixture.pose), kSupport | kWall, kFixtureMark);
 }
 
 // Meshes by number, in the order in which write_robot meets them.
@@ -224,10 +229,6 @@ void write_object(Writer& xml, const SceneObject& object, bool is_target, bool i
   static constexpr std::array kPalette{"0.75 0.32 0.27 1", "0.30 0.47 0.71 1", "0.85 0.62 0.27 1", "0.54 0.40 0.66 1",
                                        "0.45 0.60 0.65 1"};
   const std::size_t colour = std::hash<std::string>{}(object.name) % kPalette.size();
-  const std::string size =
-      object.shape == Shape::kBox
-          ? fmt::format(R"(type="box" size="{} {} {}")", object.size[0] / 2, object.size[1] / 2, object.size[2] / 2)
-          : fmt::format(R"(type="cylinder" size="{} {}")", object.radius, object.height / 2);
   xml.line(R"(<body pos="{} {} {}" quat="{} 0 0 {}" mocap="{}">)", object.x, object.y, object.rest_height(),
            std::cos(object.yaw / 2), std::sin(object.yaw / 2), !is_free);
   if (is_free) xml.line("<freejoint/>");
@@ -235,8 +236,8 @@ void write_object(Writer& xml, const SceneObject& object, bool is_target, bool i
   // priority; between two objects the engine takes the larger one.
   xml.line(
       R"(<geom {} mass="{}" friction="{} 0.005 0.0001" condim="3" priority="1" rgba="{}" contype="{}" conaffinity="{}"/>)",
-      size, object.mass, object.friction, is_target ? "0.20 0.65 0.30 1" : kPalette[colour], is_free ? kMovable : 0,
-      (is_free ? kSupport : 0) | kMovable | kRobot);
+      shape_text(object), object.mass, object.friction, is_target ? "0.20 0.65 0.30 1" : kPalette[colour],
+      is_free ? kMovable : 0, (is_free ? kSupport : 0) | kMovable | kRobot);
   xml.line("</body>");
 }
 

@@ -58,10 +58,11 @@ Outlook outlook(const TaskGeometry& geometry, const Objective& objective, const 
   const double distance = foretells ? geometry.kind->distance(geometry, x) : 0.0;
   Approach approach(geometry, distance);
   double nearer = kSlack;
+  const double change_weight = objective.weight("acceleration");
   std::span<const double> before = u_before;
   for (int t = done; t < controls.steps(); ++t) {
     const std::span<const double> u = controls.step(t);
-    outlook.cost += objective.weight("acceleration") * acceleration_cost(before, u);
+    outlook.cost += change_weight * acceleration_cost(before, u);
     if (foretells) nearer += approach.step(before, u, step_duration);
     before = u;
   }

@@ -10,6 +10,8 @@
 #include <sstream>
 #include <system_error>
 
+#include "physics_pool/robot/pose_text.hpp"
+
 namespace jostle::embedded {
 extern const std::span<const std::pair<std::string_view, std::string_view>> kRobots;
 }
@@ -19,6 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using yaml::Fields;
+using yaml::quoted;
 
 constexpr std::initializer_list<std::pair<const char*, JointKind>> kJointKinds{{"hinge", JointKind::kHinge},
                                                                                {"slide", JointKind::kSlide}};
@@ -152,18 +155,6 @@ class Lines {
  private:
   std::string blanks_, text_;
 };
-
-std::string quoted(const std::string& text) {
-  YAML::Emitter out;
-  out << YAML::DoubleQuoted << text;
-  return out.c_str();
-}
-
-// fmt's {} is the shortest text that reads back to the same double.
-std::string pose_text(const Pose& pose) {
-  return fmt::format("{{position: [{}], orientation: [{}]}}", fmt::join(pose.position, ", "),
-                     fmt::join(pose.orientation, ", "));
-}
 
 std::string joint_text(const Joint& joint) {
   std::string text = fmt::format("{{name: {}, kind: {}, axis: [{}]", quoted(joint.name),

@@ -169,25 +169,35 @@ Result<void> check_surface(const Surface& surface, const Locate& locate) {
   return {};
 }
 
+// Of an object or a fixture.
+template <class Body>
+Result<void> check_sizes(const Body& body, const Field& parent, const Locate& locate, double largest) {
+  if (body.shape == Shape::kCylinder) {
+    return check(locate, parent,
+                 {{"radius", body.radius, kSmallest, largest, "m"}, {"height", body.height, kSmallest, largest, "m"}});
+  }
+  return check(locate, parent,
+               {{"size[0]", body.size[0], kSmallest, largest, "m"},
+                {"size[1]", body.size[1], kSmallest, largest, "m"},
+                {"size[2]", body.size[2], kSmallest, largest, "m"}});
+}
+
+// `at`: the pose's own name, with a dot behind it.
+Result<void> check_pose(const Pose& pose, const Field& at, const Locate& locate) {
+  const auto& [p, q] = pose;
+  const double length = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  return check(locate, at,
+               {{"position[0]", p[0], -10, 10, "m"},
+                {"position[1]", p[1], -10, 10, "m"},
+                {"position[2]", p[2], -10, 10, "m"},
+                {"orientation", length, 1 - 1e-6, 1 + 1e-6, "as the squared length of a unit quaternion"}});
+}
+
 Result<void> check_fixture(const Fixture& fixture, const Field& parent, const Locate& locate) {
   if (fixture.name.empty())
     return invalid(locate, {parent.path + "name", parent.shown + "name"}, "got '', wanted a name");
-  auto sizes =
-      fixture.shape == Shape::kBox
-          ? check(locate, parent,
-                  {{"size[0]", fixture.size[0], kSmallest, 10, "m"},
-                   {"size[1]", fixture.size[1], kSmallest, 10, "m"},
-                   {"size[2]", fixture.size[2], kSmallest, 10, "m"}})
-          : check(locate, parent,
-                  {{"radius", fixture.radius, kSmallest, 10, "m"}, {"height", fixture.height, kSmallest, 10, "m"}});
-  if (!sizes) return sizes;
-  const auto& [p, q] = fixture.pose;
-  const double length = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-  return check(locate, parent,
-               {{"pose.position[0]", p[0], -10, 10, "m"},
-                {"pose.position[1]", p[1], -10, 10, "m"},
-                {"pose.position[2]", p[2], -10, 10, "m"},
-                {"pose.orientation", length, 1 - 1e-6, 1 + 1e-6, "as the squared length of a unit quaternion"}});
+  if (auto ok = check_sizes(fixture, parent, locate, 10); !ok) return ok;
+  return check_pose(fixture.pose, {parent.path + "pose.", parent.shown + "pose."}, locate);
 }
 
 Result<void> check_robot(const SceneRobot& robot, const Locate& locate) {
@@ -196,17 +206,7 @@ Result<void> check_robot(const SceneRobot& robot, const Locate& locate) {
     return Error{ok.error().code,
                  fmt::format("{}: {}", locate(message.substr(0, message.find_first_of("[:"))), message)};
   }
-  const auto& [p, orientation] = robot.base;
-  double length = 0.0;
-  for (const double component : orientation) length += component * component;
-  if (auto ok = check(locate, {"robot.base.", "robot.base."},
-                      {{"position[0]", p[0], -10, 10, "m"},
-                       {"position[1]", p[1], -10, 10, "m"},
-                       {"position[2]", p[2], -10, 10, "m"},
-                       {"orientation", length, 1 - 1e-6, 1 + 1e-6, "as the squared length of a unit quaternion"}});
-      !ok) {
-    return ok;
-  }
+  if (auto ok = check_pose(robot.base, {"robot.base.", "robot.base."}, locate); !ok) return ok;
   if (as_planar(robot.model) && !(robot.base == Pose{})) {
     return invalid(
         locate, {"robot.base", "robot.base"},
@@ -353,14 +353,7 @@ Result<void> validate(const Scene& scene, const Locate& locate) {
     if (!names.insert(object.name).second) {
       return invalid_at("name", "already taken, wanted a unique name");
     }
-    auto sizes = object.shape == Shape::kBox ? check(locate, parent,
-                                                     {{"size[0]", object.size[0], kSmallest, kLargest, "m"},
-                                                      {"size[1]", object.size[1], kSmallest, kLargest, "m"},
-                                                      {"size[2]", object.size[2], kSmallest, kLargest, "m"}})
-                                             : check(locate, parent,
-                                                     {{"radius", object.radius, kSmallest, kLargest, "m"},
-                                                      {"height", object.height, kSmallest, kLargest, "m"}});
-    if (!sizes) return sizes;
+    if (auto ok = check_sizes(object, parent, locate, kLargest); !ok) return ok;
     if (auto ok = check(locate, parent,
                         {{"mass", object.mass, 1e-4, 100, "kg"},
                          {"friction", object.friction, 0, 5, ""},

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "idl/text/yaml_fields.hpp"
+#include "physics_pool/robot/pose_text.hpp"
 #include "physics_pool/scene/scene.hpp"
 #include "physics_pool/scene/task_kind.hpp"
 
@@ -16,6 +17,7 @@ namespace jostle::physics_pool {
 namespace {
 
 using yaml::Fields;
+using yaml::quoted;
 
 void read_disc(Fields& fields, Disc& disc) {
   fields.required("x", disc.x);
@@ -82,16 +84,22 @@ void read_pose(Fields& in, Pose& pose) {
   in.numbers("orientation", pose.orientation, false);
 }
 
+// Of an object or a fixture.
+template <class Body>
+void read_shape(Fields& in, Body& body) {
+  in.choice<Shape>("shape", body.shape, {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}});
+  if (body.shape == Shape::kBox) {
+    in.numbers("size", body.size, true);
+  } else {
+    in.required("radius", body.radius);
+    in.required("height", body.height);
+  }
+}
+
 Fixture read_fixture(Fields& in) {
   Fixture fixture;
   in.required("name", fixture.name);
-  in.choice<Shape>("shape", fixture.shape, {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}});
-  if (fixture.shape == Shape::kBox) {
-    in.numbers("size", fixture.size, true);
-  } else {
-    in.required("radius", fixture.radius);
-    in.required("height", fixture.height);
-  }
+  read_shape(in, fixture);
   in.section("pose", true, [&](Fields& pose) { read_pose(pose, fixture.pose); });
   return fixture;
 }
@@ -140,13 +148,7 @@ Scene read(const YAML::Node& root, const std::string& origin, const RobotPath& r
   fields.list("objects", [&](Fields& entry) {
     SceneObject object;
     entry.required("name", object.name);
-    entry.choice<Shape>("shape", object.shape, {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}});
-    if (object.shape == Shape::kBox) {
-      entry.numbers("size", object.size, true);
-    } else {
-      entry.required("radius", object.radius);
-      entry.required("height", object.height);
-    }
+    read_shape(entry, object);
     entry.required("mass", object.mass);
     entry.required("friction", object.friction);
     entry.section("pose", true, [&](Fields& pose) {
@@ -173,11 +175,11 @@ Scene read(const YAML::Node& root, const std::string& origin, const RobotPath& r
   return scene;
 }
 
-// Quotes as YAML (and JSON) do, so that any name survives.
-std::string quoted(const std::string& text) {
-  YAML::Emitter out;
-  out << YAML::DoubleQuoted << text;
-  return out.c_str();
+// The lines of `read_shape`.
+template <class Body>
+std::string shape_text(const Body& body) {
+  if (body.shape == Shape::kBox) return fmt::format("    shape: box\n    size: [{}]\n", fmt::join(body.size, ", "));
+  return fmt::format("    shape: cylinder\n    radius: {}\n    height: {}\n", body.radius, body.height);
 }
 
 }  // namespace
@@ -211,10 +213,6 @@ std::string to_yaml(const Scene& scene, RobotText robot_text_as) {
     fmt::format_to(std::back_inserter(text), format, std::forward<T>(values)...);
     text += '\n';
   };
-  const auto pose = [](const Pose& X) {
-    return fmt::format("{{position: [{}], orientation: [{}]}}", fmt::join(X.position, ", "),
-                       fmt::join(X.orientation, ", "));
-  };
   line("jostle_scene: 2");
   line("name: {}", quoted(scene.name));
   line("surface:");
@@ -225,15 +223,8 @@ std::string to_yaml(const Scene& scene, RobotText robot_text_as) {
   if (!scene.fixtures.empty()) line("fixtures:");
   for (const Fixture& fixture : scene.fixtures) {
     line("  - name: {}", quoted(fixture.name));
-    if (fixture.shape == Shape::kBox) {
-      line("    shape: box");
-      line("    size: [{}, {}, {}]", fixture.size[0], fixture.size[1], fixture.size[2]);
-    } else {
-      line("    shape: cylinder");
-      line("    radius: {}", fixture.radius);
-      line("    height: {}", fixture.height);
-    }
-    line("    pose: {}", pose(fixture.pose));
+    text += shape_text(fixture);
+    line("    pose: {}", pose_text(fixture.pose));
   }
   line("robot:");
   const auto known_result = builtin_robot(scene.robot.model.name);
@@ -243,7 +234,7 @@ std::string to_yaml(const Scene& scene, RobotText robot_text_as) {
     line("  model:");
     text += robot_text(scene.robot.model, 4);
   }
-  line("  base: {}", pose(scene.robot.base));
+  line("  base: {}", pose_text(scene.robot.base));
   line("  start:");
   for (std::size_t i = 0; i < scene.robot.q.size(); ++i) {
     line("    {}: {}", quoted(scene.robot.model.joints[i].name), scene.robot.q[i]);
@@ -251,14 +242,7 @@ std::string to_yaml(const Scene& scene, RobotText robot_text_as) {
   line("objects:");
   for (const SceneObject& object : scene.objects) {
     line("  - name: {}", quoted(object.name));
-    if (object.shape == Shape::kBox) {
-      line("    shape: box");
-      line("    size: [{}, {}, {}]", object.size[0], object.size[1], object.size[2]);
-    } else {
-      line("    shape: cylinder");
-      line("    radius: {}", object.radius);
-      line("    height: {}", object.height);
-    }
+    text += shape_text(object);
     line("    mass: {}", object.mass);
     line("    friction: {}", object.friction);
     line("    pose: {{x: {}, y: {}, yaw: {}}}", object.x, object.y, object.yaw);

@@ -83,11 +83,15 @@ Result<std::string> perturb(const Arguments& arguments) {
   return to_yaml(physics_pool::perturb(*scene_result, *level_result, arguments.seed), physics_pool::RobotText::kByName);
 }
 
-std::string size_text(const SceneObject& object) {
-  if (object.shape == physics_pool::Shape::kBox) {
-    return fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * object.size[0], 1e3 * object.size[1], 1e3 * object.size[2]);
+const char* word(physics_pool::Shape shape) { return shape == physics_pool::Shape::kBox ? "box" : "cylinder"; }
+
+// Of an object or a fixture.
+template <class Body>
+std::string size_text(const Body& body) {
+  if (body.shape == physics_pool::Shape::kBox) {
+    return fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * body.size[0], 1e3 * body.size[1], 1e3 * body.size[2]);
   }
-  return fmt::format("r {:.1f}, h {:.1f}", 1e3 * object.radius, 1e3 * object.height);
+  return fmt::format("r {:.1f}, h {:.1f}", 1e3 * body.radius, 1e3 * body.height);
 }
 
 Result<std::string> show(const Arguments& arguments) {
@@ -116,16 +120,11 @@ Result<std::string> show(const Arguments& arguments) {
   print("{:16} {:9} {:20} {:>8} {:>9} {:>8} {:>8} {:>8}\n", "name", "shape", "size mm", "mass kg", "friction", "x m",
         "y m", "yaw rad");
   for (const SceneObject& object : scene.objects) {
-    print("{:16} {:9} {:20} {:>8.3f} {:>9.3f} {:>8.3f} {:>8.3f} {:>8.3f}\n", object.name,
-          object.shape == physics_pool::Shape::kBox ? "box" : "cylinder", size_text(object), object.mass,
-          object.friction, object.x, object.y, object.yaw);
+    print("{:16} {:9} {:20} {:>8.3f} {:>9.3f} {:>8.3f} {:>8.3f} {:>8.3f}\n", object.name, word(object.shape),
+          size_text(object), object.mass, object.friction, object.x, object.y, object.yaw);
   }
   for (const physics_pool::Fixture& fixture : scene.fixtures) {
-    const bool box = fixture.shape == physics_pool::Shape::kBox;
-    print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", fixture.name, box ? "box" : "cylinder",
-          box ? fmt::format("{:.1f} x {:.1f} x {:.1f}", 1e3 * fixture.size[0], 1e3 * fixture.size[1],
-                            1e3 * fixture.size[2])
-              : fmt::format("r {:.1f}, h {:.1f}", 1e3 * fixture.radius, 1e3 * fixture.height),
+    print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", fixture.name, word(fixture.shape), size_text(fixture),
           "fixed", "", fixture.pose.position[0], fixture.pose.position[1]);
   }
   if (physics_pool::find_task_kind(scene.task.kind)->has_goal) show_disc("(goal)", scene.task.goal);

@@ -100,7 +100,7 @@ msg::BatchDescription to_wire(const RolloutBatch& batch) {
 }
 
 RolloutBatch from_wire(const msg::BatchDescription& wire) {
-  RolloutBatch batch;
+  RolloutBatch batch{.objective = {.terms = from_wire(wire.terms()), .success_cost = wire.success_cost()}};
   batch.world = from_wire(wire.world());
   batch.x0 = {.q = wire.q(), .v = wire.v()};
   batch.nominal = {.nu = wire.nu(), .values = wire.nominal()};
@@ -115,7 +115,6 @@ RolloutBatch from_wire(const msg::BatchDescription& wire) {
                .draws = wire.draws()};
   batch.first_sample = wire.first_sample();
   batch.samples = wire.samples();
-  batch.objective = {.terms = from_wire(wire.terms()), .success_cost = wire.success_cost()};
   batch.noise = {.sigma = wire.noise().sigma(), .slope = wire.noise().slope(), .seed = wire.noise().seed()};
   batch.incumbent = wire.incumbent();
   batch.stop_losers = wire.stop_losers();

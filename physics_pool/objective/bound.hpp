@@ -33,6 +33,7 @@ struct Outlook {
 ///
 ///   d_T(end) >= d_T - sum_s 2·(sum_i |u_i|·r_i)·Delta_t
 ///
+/// Of arms this was tried on the few pushes of the pool's contract suite, and on no random ones.
 /// For other tasks the goal's cost has no bound: a pushed target may have been given any speed.
 ///
 /// `u_before`: control before step `done`.

@@ -52,6 +52,10 @@ inline std::string quoted(const std::string& text) {
   return out.c_str();
 }
 
+inline Error not_yaml(const YAML::Exception& error, const std::string& origin) {
+  return {Code::kInvalidArgument, fmt::format("{}:{}: not YAML: {}", origin, error.mark.line + 1, error.msg)};
+}
+
 /// One mapping of a file: hands out its fields and knows which were asked for.
 class Fields {
  public:
@@ -218,16 +222,26 @@ class Fields {
   std::set<std::string> known_;
 };
 
-/// Returns what `read` makes of the text's root node, a Result<T>. Whatever is malformed
+/// Returns what `reader` makes of a tree's root node, a Result<T>. Whatever is malformed
 /// becomes an Error of kInvalidArgument that names file and line.
-template <class T, class Read>
-Result<T> parse(std::string_view text, const std::string& origin, Read read) {
+template <class T, class Reader>
+Result<T> read(const YAML::Node& root, const std::string& origin, Reader reader) {
   try {
-    return read(YAML::Load(std::string(text)));
+    return reader(root);
   } catch (const Malformed& malformed) {
     return Error{Code::kInvalidArgument, malformed.message};
   } catch (const YAML::Exception& error) {
-    return Error{Code::kInvalidArgument, fmt::format("{}:{}: not YAML: {}", origin, error.mark.line + 1, error.msg)};
+    return not_yaml(error, origin);
+  }
+}
+
+/// The same for a text.
+template <class T, class Reader>
+Result<T> parse(std::string_view text, const std::string& origin, Reader reader) {
+  try {
+    return read<T>(YAML::Load(std::string(text)), origin, reader);
+  } catch (const YAML::Exception& error) {
+    return not_yaml(error, origin);
   }
 }
 

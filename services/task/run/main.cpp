@@ -20,7 +20,8 @@ using namespace jostle;
 using namespace jostle::task;
 
 struct Arguments {
-  std::string scene, level = "none", parameters;
+  std::string scene, level = "none";
+  ParameterOptions parameters;
 };
 
 // Reads the files the arguments name.
@@ -38,14 +39,13 @@ Result<void> complete(const Arguments& arguments, RunOptions& options) {
   options.controller = kind->name;
   if (auto ok = Predictor::check(options.predictor, options.planning); !ok)
     return Error{ok.error().code, "--" + ok.error().message};
-  const std::filesystem::path file =
-      arguments.parameters.empty() ? common::data_file(kind->parameters) : std::filesystem::path(arguments.parameters);
-  auto parameters_result = common::read_text(file);
+  auto standard_result = standard_parameters(*kind);
+  if (!standard_result) return standard_result.error();
+  auto parameters_result = choose_parameters(*kind, arguments.parameters);
   if (!parameters_result) return parameters_result.error();
-  options.parameters = std::move(parameters_result).value();
-  const auto parsed_result = parse_parameters(options.parameters, file.string());
-  if (!parsed_result) return parsed_result.error();
-  return check_fit(*parsed_result, options.planning);
+  options.parameters = to_yaml(*parameters_result);
+  options.changed = differences(*standard_result, *parameters_result);
+  return check_fit(*parameters_result, options.planning);
 }
 
 int fail(const Error& error, int code) {
@@ -98,12 +98,19 @@ int main(int argc, char** argv) {
          "parareal:adaptive[,MODEL][,split]; MODEL is kinematic, limit-surface, planar, learned or learned:FILE")
       ->capture_default_str();
   app.add_option("--uncertainty", arguments.level, "none, low, medium or high")->capture_default_str();
-  app.add_option("--seed", options.seed, "Of all noise, the planner's and the world's")->capture_default_str();
+  app.add_option("--seed", options.seed, "Seed of all noise, the planner's and the world's")->capture_default_str();
   app.add_option("--pool", options.pool, "dds: worker processes; threads: threads of the coordinator")
       ->capture_default_str()
       ->check(CLI::IsMember({"dds", "threads"}));
-  app.add_option("--parameters", arguments.parameters,
-                 "Planner's and controller's (default: experiments/grasping.yaml, or pushing.yaml)");
+  app.add_option("--parameters", arguments.parameters.file,
+                 "Parameter file (YAML) of planner and controller; what it leaves out keeps its default.\n"
+                 "`jostle parameters` lists keys and defaults");
+  app.add_option("--set", arguments.parameters.settings,
+                 "One parameter, such as planner.rollouts=4; may be given again")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  app.add_option("--timeout", arguments.parameters.timeout,
+                 "Seconds for planning and acting together, the same as --set control.timeout=… (default: 900)");
   app.add_option("--json", options.json, "File for the result");
   app.add_option("--picture", options.picture, "PNG of the execution");
   app.add_option("--record", options.record, "Folder for a bag of the whole run; `jostle record` has more to say");

@@ -10,13 +10,15 @@
 
 #include "physics_pool/scene/scene.hpp"
 #include "physics_pool/uncertainty/levels.hpp"
+#include "services/task/config/parameter_keys.hpp"
 
 namespace jostle::task {
 
 struct RunOptions {
-  physics_pool::Scene scene;     ///< execution world
-  physics_pool::Scene planning;  ///< what the planner believes
-  std::string parameters;        ///< YAML text
+  physics_pool::Scene scene;                 ///< execution world
+  physics_pool::Scene planning;              ///< what the planner believes
+  std::string parameters;                    ///< YAML text, complete
+  std::vector<ParameterDifference> changed;  ///< what differs from the controller's own parameters
   physics_pool::Uncertainty level = physics_pool::Uncertainty::kNone;
   std::string controller;          ///< a name of planners/controllers/catalogue.hpp
   std::string predictor = "fine";  ///< see services/task/config/predictor.hpp

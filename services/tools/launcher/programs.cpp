@@ -20,6 +20,7 @@ constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string
     {"doctor", "say what is wrong with this machine, and the remedy"},
     {"experiment", "run a study of the thesis and write its figure or table"},
     {"keys", "make, hand out and revoke identities for protected DDS"},
+    {"parameters", "list the parameters of planners and controllers, and their defaults"},
     {"play", "publish what is in a bag, at any speed, from any moment"},
     {"record", "write topics into a bag"},
     {"render", "draw states of a scene, or a recorded run"},

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <type_traits>
@@ -126,9 +127,10 @@ void add_planner(std::vector<ParameterKey>& keys) {
       [](auto& p) -> auto& { return p.planner.screening_time_step; }));
 }
 
-// "w_a of Eq. 3.2: squared change" becomes a sentence.
+// A phrase of the catalogue as a sentence; symbols such as w_a keep their case.
 std::string sentence(std::string text) {
-  if (!text.empty()) text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  const bool is_word = text.size() > 1 && std::islower(static_cast<unsigned char>(text[1])) != 0;
+  if (is_word) text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
   return text + ".";
 }
 

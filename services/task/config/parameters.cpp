@@ -34,8 +34,8 @@ void read_as(const char* name, const ParameterKey& key, yaml::Fields& in, Parame
   std::visit([&](auto& v) { in.optional(name, v); }, value);
   if (!in.has(name)) return;
   if (!in_range(key, value)) {
-    const bool is_word = !key.words.empty();
-    in.refuse(name, fmt::format(is_word ? "got '{}', wanted {}" : "got {}, wanted {}", to_text(value), key.wanted()));
+    const std::string got = key.words.empty() ? to_text(value) : "'" + to_text(value) + "'";
+    in.refuse(name, fmt::format("got {}, wanted {}", got, key.wanted()));
   }
   key.set(parameters, value);
 }

@@ -112,8 +112,8 @@ void print_summary(const RunOptions& options, const json& report) {
   }
   fmt::print("  execution    {} actions, {} re-plans, {:.1f} s in all\n", report["actions"].get<int>(),
              report["replans"].get<int>(), report["total_seconds"].get<double>());
-  fmt::print("  physics      {} rollouts, {} x {}, controller {}\n", report["rollouts"].get<std::uint64_t>(),
-             report["used_workers"].size(), options.pool == "dds" ? "worker process" : "thread", options.controller);
+  fmt::print("  physics      {} rollouts on {} {}, controller {}\n", report["rollouts"].get<std::uint64_t>(),
+             report["used_workers"].size(), options.pool == "threads" ? "threads" : "workers", options.controller);
   for (const ParameterDifference& change : options.changed) {
     fmt::print("  parameter    {} {}, by default {}\n", change.key, to_text(change.after), to_text(change.before));
   }
@@ -144,8 +144,10 @@ Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::Goa
   report["controller"] = options.controller;
   report["predictor"] = options.predictor;
   report["uncertainty"] = physics_pool::to_string(options.level);
-  report["pool"] = options.pool;
-  report["workers"] = options.workers;
+  if (!options.pool.empty()) {  // otherwise the coordinator has one that we know nothing of
+    report["pool"] = options.pool;
+    report["workers"] = options.workers;
+  }
   report["scene"] = options.scene.name;
   report["parameters"] = options.parameters;
   report["changed_parameters"] = changes_of(options);

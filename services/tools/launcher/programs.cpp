@@ -19,6 +19,7 @@ constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string
     {"discovery-server", "introduce machines to each other where there is no multicast"},
     {"doctor", "say what is wrong with this machine, and the remedy"},
     {"experiment", "run a study of the thesis and write its figure or table"},
+    {"goal", "give a scene to a coordinator and a world that run"},
     {"keys", "make, hand out and revoke identities for protected DDS"},
     {"parameters", "list the parameters of planners and controllers, and their defaults"},
     {"play", "publish what is in a bag, at any speed, from any moment"},

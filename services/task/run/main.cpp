@@ -68,9 +68,10 @@ int perform(const RunOptions& options, std::stop_token stop) {
     return fail(result.error(),
                 result.error().code == Code::kCancelled ? common::kExitInterrupted : common::kExitBroken);
   if (!result->error().empty()) return fail({Code::kUnavailable, result->error()}, common::kExitBroken);
-  (*session_result)->finish_recording();
+  const auto recorded = (*session_result)->finish_recording();
   session_result->reset();  // before drawing: every process it started is gone
   if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), common::kExitBroken);
+  if (!recorded) return fail(recorded.error(), common::kExitBroken);
   return result->success() ? common::kExitOk : common::kExitFailed;
 }
 
@@ -115,8 +116,8 @@ int main(int argc, char** argv) {
   common::add_network_options(app);
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.footer(
-      "Exit codes: 0 grasped or pushed to its goal, 1 not, 2 bad input, 3 a part of the system failed, 130 "
-      "interrupted.");
+      "Exit codes: 0 grasped or pushed to its goal, 1 not, 2 bad input, 3 a part of the system failed or the\n"
+      "recording is not complete, 130 interrupted.");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   if (options.pool == "threads" && options.workers == 0) {
     return fail({Code::kInvalidArgument, "--workers: got 0, wanted at least 1 thread"}, common::kExitUsage);

@@ -1,10 +1,13 @@
 #include "services/task/run/session.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <iterator>
+#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
@@ -12,7 +15,8 @@
 namespace jostle::task {
 namespace {
 
-constexpr std::chrono::milliseconds kSilence{1500};  // of a process that speaks ten times a second
+constexpr std::chrono::milliseconds kSilence{1500};  // of a process that speaks ten times a second: worth a word
+constexpr std::chrono::seconds kLongSilence{10};     // it does not come back
 constexpr std::chrono::seconds kStart{15};           // for processes to start and find each other
 constexpr std::chrono::milliseconds kTick{50};
 constexpr std::chrono::seconds kCancelPatience{2};
@@ -52,7 +56,8 @@ Session::Session(const RunOptions& options, Watcher watcher, wire::Participant p
       cancel_(participant_, wire::topics::kTaskCancel),
       feedback_(participant_, wire::topics::kTaskFeedback, 64),
       world_(participant_, wire::topics::kRobotStatus, 64),
-      results_(participant_, wire::topics::kTaskResult, 8) {}
+      results_(participant_, wire::topics::kTaskResult, 8),
+      witness_(participant_, !options.record.empty()) {}
 
 Session::~Session() {
   // All at once, then one after the other: shutting down takes as long as the slowest.
@@ -63,7 +68,7 @@ Session::~Session() {
   workers_.clear();
   world_process_.reset();
   coordinator_process_.reset();
-  finish_recording();
+  (void)finish_recording();  // a run that failed has said worse
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
 }
@@ -74,7 +79,7 @@ Result<void> Session::start_recorder() {
   auto process_result = common::ChildProcess::start(
       program("record"),
       {"--output", options_.record.string(), "--until-result", "--domain", std::to_string(participant_.domain()),
-       "--die-with-parent", std::to_string(getpid())},
+       "--die-with-parent", std::to_string(getpid()), "--json", (folder_ / "record.json").string()},
       folder_ / "record.log");
   if (!process_result) return process_result.error();
   recorder_process_ = std::move(process_result).value();
@@ -92,21 +97,47 @@ Result<void> Session::start_recorder() {
   return {};
 }
 
-void Session::finish_recording() {
-  if (!recorder_process_) return;
+Result<void> Session::finish_recording() {
+  if (!recorder_process_) return {};
   if (!recorder_process_->wait_for(kLastWords)) recorder_process_->terminate();
   recorder_process_->wait_for(kStart);
+  auto ok = check_recording();
   look_after_recorder();
+  return ok;
+}
+
+// What we heard ourselves must be in the bag: a recorder that did not run for a while does not know what it missed.
+Result<void> Session::check_recording() const {
+  const auto text_result = common::read_text(folder_ / "record.json");
+  const auto report = nlohmann::json::parse(text_result ? *text_result : "", nullptr, false);
+  std::vector<std::string> gaps;
+  if (report.is_discarded()) gaps.emplace_back("its recorder did not end in an orderly way");
+  for (const auto& [topic, heard] : witness_.counts()) {
+    if (report.is_discarded()) break;
+    const std::uint64_t recorded = report["messages"].value(topic, std::uint64_t{0});
+    const std::uint64_t lost = report["lost"].value(topic, std::uint64_t{0});
+    if (recorded < heard) gaps.push_back(fmt::format("{} of {} messages of {}", heard - recorded, heard, topic));
+    if (recorded >= heard && lost > 0) gaps.push_back(fmt::format("{} messages of {}", lost, topic));
+  }
+  if (gaps.empty()) return {};
+  return Error{Code::kIo,
+               fmt::format("the recording {} is not complete: {} {} missing, for the recorder did not run or was cut "
+                           "off for a while; it cannot be replayed as a whole",
+                           options_.record.string(), fmt::join(gaps, ", "), gaps.size() == 1 ? "is" : "are")};
+}
+
+void Session::notice(const std::string& text) const {
+  if (watcher_.on_notice) watcher_.on_notice(text);
 }
 
 void Session::look_after_recorder() {
   if (!recorder_process_) return;
   const auto ended = recorder_process_->ended();
-  if (!ended) return;
-  if (!ended->ok() && watcher_.on_notice) {
-    watcher_.on_notice(fmt::format("the recorder ended: {}\n{}", ended->text(), recorder_process_->last_words()));
+  if (!ended || recorder_missed_) return;
+  recorder_missed_ = true;
+  if (!ended->ok()) {
+    notice(fmt::format("the recorder ended: {}\n{}", ended->text(), recorder_process_->last_words()));
   }
-  recorder_process_.reset();
 }
 
 Result<void> Session::start_processes() {
@@ -145,9 +176,9 @@ Result<void> Session::start_processes() {
 }
 
 Result<common::ChildProcess> Session::start_worker(std::size_t place) {
-  const std::string name = fmt::format("worker-{}", workers_started_++);
-  std::vector<std::string> arguments{
-      "--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())};
+  const std::string name = fmt::format("worker-{}", workers_started_++);  // of its log; it calls itself by host and pid
+  std::vector<std::string> arguments{"--domain", std::to_string(participant_.domain()), "--die-with-parent",
+                                     std::to_string(getpid())};
   if (const auto& cores = options_.cores; !cores.empty()) {
     arguments.insert(arguments.end(), {"--pin", std::to_string(cores[place % cores.size()])});
   }
@@ -157,10 +188,10 @@ Result<common::ChildProcess> Session::start_worker(std::size_t place) {
 Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
   std::optional<Clock::time_point> cancelled;
   for (;;) {
-    if (auto result = results_.take(Clock::now() + kTick, cancelled ? std::stop_token{} : stop)) {
-      if (result->goal_id() == goal_id_) {
+    if (auto letter = results_.take_letter(Clock::now() + kTick, cancelled ? std::stop_token{} : stop)) {
+      if (letter->sample.goal_id() == goal_id_ && letter->writer == coordinator_id_) {
         if (cancelled) return Error{Code::kCancelled, "interrupted; the task was cancelled"};
-        return *std::move(result);
+        return std::move(letter->sample);
       }
     }
     if (stop.stop_requested() && !cancelled) {
@@ -181,13 +212,16 @@ Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
 }
 
 void Session::listen() {
-  for (const auto& feedback : feedback_.take_all()) {
-    coordinator_heard_ = Clock::now();
+  for (const auto& [feedback, writer] : feedback_.take_letters()) {
+    if (sent_ && writer != coordinator_id_) continue;
+    coordinator_.heard = Clock::now();
     // Ours is idle until it gets our goal; it may be the last one we hear of.
     if (!sent_ && !feedback.goal_id().empty()) others_heard_ = true;
-    if (sent_ && feedback.goal_id() == goal_id_ && watcher_.on_feedback) watcher_.on_feedback(feedback);
+    if (!sent_ || feedback.goal_id() != goal_id_) continue;
+    if (watcher_.on_feedback) watcher_.on_feedback(feedback);
+    if (std::exchange(trouble_, feedback.trouble()) != feedback.trouble() && !trouble_.empty()) notice(trouble_);
   }
-  if (!world_.take_all().empty()) world_heard_ = Clock::now();
+  if (!world_.take_all().empty()) world_part_.heard = Clock::now();
 }
 
 // Who takes goals and gives feedback. Whoever does only one of them looks on.
@@ -210,7 +244,7 @@ Result<void> Session::send_goal() {
   // Another one may be found before ours is there: it says its number when it starts.
   const bool ours = found.size() == 1 && coordinator_process_->has_said(common::participant_name(found.front()));
   const bool answers = ours && feedback_.last_writer() == found.front() && results_.hears(found.front());
-  if (!answers || !world_heard_) {
+  if (!answers || !world_part_.heard) {
     if (Clock::now() < goal_deadline_) return {};
     return Error{Code::kUnavailable,
                  fmt::format("{} not heard within {} s of its start on domain {}; `jostle doctor` checks "
@@ -227,6 +261,7 @@ Result<void> Session::send_goal() {
   goal.predictor(options_.predictor);
   goal.seed(options_.seed);
   goal.plan_only(options_.plan_only);
+  coordinator_id_ = found.front();
   sent_ = goal_.write(goal);
   if (sent_ || Clock::now() < goal_deadline_) return {};  // tried again at the next tick
   return Error{Code::kUnavailable,
@@ -239,11 +274,14 @@ Result<void> Session::look_after() {
   look_after_recorder();
   if (auto ok = check_alive("the simulated world", *world_process_); !ok) return ok;
   if (auto ok = check_alive("the coordinator", *coordinator_process_); !ok) return ok;
-  if (world_heard_) {
-    if (auto ok = check_heard("the simulated world", *world_heard_); !ok) return ok;
-  }
-  if (coordinator_heard_) {
-    if (auto ok = check_heard("the coordinator", *coordinator_heard_); !ok) return ok;
+  look_for(world_part_);
+  look_for(coordinator_);
+  if (coordinator_.heard && Clock::now() - *coordinator_.heard >= kLongSilence) {
+    return Error{
+        Code::kUnavailable,
+        fmt::format("the coordinator runs but was not heard for {} s: stalled or cut off; `jostle doctor` checks "
+                    "the network, and fewer --workers leave it more of a busy machine",
+                    kLongSilence.count())};
   }
   for (common::ChildProcess& worker : workers_) {
     const auto ended = worker.ended();
@@ -272,11 +310,38 @@ Result<void> Session::check_alive(const std::string& name, common::ChildProcess&
   return Error{Code::kUnavailable, fmt::format("{} ended: {}\n{}", name, ended->text(), child.last_words())};
 }
 
-Result<void> Session::check_heard(const std::string& name, Clock::time_point heard) const {
-  const auto silence = Clock::now() - heard;
-  if (silence < kSilence) return {};
-  return Error{Code::kUnavailable, fmt::format("{} runs but was not heard for {:.1f} s: stalled or cut off", name,
-                                               std::chrono::duration<double>(silence).count())};
+void Session::look_for(Part& part) {
+  if (!part.heard) return;
+  const std::chrono::duration<double> silence = Clock::now() - *part.heard;
+  const bool missed = silence >= kSilence;
+  if (missed == std::exchange(part.missed, missed)) return;
+  notice(missed ? fmt::format(
+                      "{} runs but was not heard for {:.1f} s; the machine may be busy, or it is stalled or cut off",
+                      part.name, silence.count())
+                : fmt::format("{} is heard again", part.name));
+}
+
+Witness::Witness(const wire::Participant& participant, bool listens) {
+  if (!listens) return;
+  follow(runs_, participant, wire::topics::kTaskRun);
+  follow(observations_, participant, wire::topics::kTaskObservation);
+  follow(plans_, participant, wire::topics::kTaskPlan);
+  follow(results_, participant, wire::topics::kTaskResult);
+}
+
+template <class T>
+void Witness::follow(std::optional<wire::Reader<T>>& reader, const wire::Participant& participant,
+                     const wire::Topic<T>& topic) {
+  const std::string name = *wire::ros_topic(participant.wire_name(topic.name, topic.scope));
+  reader.emplace(participant, topic, [this, name](const T&) {
+    const std::lock_guard lock(mutex_);
+    ++counts_[name];
+  });
+}
+
+std::map<std::string, std::uint64_t> Witness::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
 }
 
 }  // namespace jostle::task

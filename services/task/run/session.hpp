@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -21,11 +22,33 @@
 
 namespace jostle::task {
 
+/// Counts what a bag of the run must have, by ROS 2's name of the topic. Threads: any.
+class Witness {
+ public:
+  /// Listens only where `listens`.
+  Witness(const wire::Participant& participant, bool listens);
+  std::map<std::string, std::uint64_t> counts() const;
+
+ private:
+  template <class T>
+  void follow(std::optional<wire::Reader<T>>& reader, const wire::Participant& participant,
+              const wire::Topic<T>& topic);
+
+  mutable std::mutex mutex_;  // guards counts_
+  std::map<std::string, std::uint64_t> counts_;
+  std::optional<wire::Reader<jostle_msgs::msg::TaskRun>> runs_;
+  std::optional<wire::Reader<jostle_msgs::msg::Observation>> observations_;
+  std::optional<wire::Reader<jostle_msgs::msg::Plan>> plans_;
+  std::optional<wire::Reader<jostle_msgs::msg::GoalResult>> results_;
+};
+
 /// Starts workers, simulated world and coordinator, and looks after them:
 ///
 ///   a worker that ends is replaced; its work goes to the others meanwhile
-///   a world or coordinator that ends, or is silent for kSilence, ends the run
-///   with an error that says which, how, and what it printed last
+///   a world or coordinator that ends, ends the run with an error that says which, how, and
+///   what it printed last
+///   one that is silent is news: it may be slow. The coordinator's silence ends the run when it lasts,
+///   for its result is waited for; the world's when the coordinator waits for it
 ///   a recorder that ends early is news, and the run goes on
 ///
 /// Destroying it ends every process it started and removes its files.
@@ -47,8 +70,9 @@ class Session {
   ///          kUnavailable  a part of the system is gone; the message says which
   Result<jostle_msgs::msg::GoalResult> perform(std::stop_token stop);
 
-  /// Waits until the bag, if one was asked for, has the result and is complete.
-  void finish_recording();
+  /// Waits until the bag, if one was asked for, has the result and is complete. Error kIo: it is not; says what is
+  /// missing. For after perform().
+  Result<void> finish_recording();
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -61,8 +85,18 @@ class Session {
   Result<common::ChildProcess> start_worker(std::size_t place);  // index among the workers
   Result<void> look_after();
   void look_after_recorder();
+  Result<void> check_recording() const;
   Result<void> check_alive(const std::string& name, common::ChildProcess& child) const;
-  Result<void> check_heard(const std::string& name, Clock::time_point heard) const;
+  /// Another part of the run, and when it was heard last.
+  struct Part {
+    std::string name;
+    std::optional<Clock::time_point> heard;
+    bool missed = false;  // and said so
+  };
+
+  /// Says when it falls silent, and when it is heard again.
+  void look_for(Part& part);
+  void notice(const std::string& text) const;
   void listen();
   std::vector<std::uint64_t> coordinators() const;  // their participants, ascending
   Result<void> send_goal();
@@ -77,16 +111,20 @@ class Session {
   bool others_heard_ = false;  // a coordinator that works for somebody else
   int workers_started_ = 0;
   Clock::time_point goal_deadline_;
-  std::optional<Clock::time_point> coordinator_heard_, world_heard_;
+  Part coordinator_{"the coordinator"}, world_part_{"the simulated world"};
+  std::uint64_t coordinator_id_ = 0;  // its participant, once the goal was sent
+  std::string trouble_;               // the coordinator's newest
 
   wire::Writer<jostle_msgs::msg::Goal> goal_;
   wire::Writer<jostle_msgs::msg::Cancel> cancel_;
   wire::Inbox<jostle_msgs::msg::Feedback> feedback_;
   wire::Inbox<jostle_msgs::msg::RobotStatus> world_;
   wire::Inbox<jostle_msgs::msg::GoalResult> results_;
+  Witness witness_;
 
   std::vector<common::ChildProcess> workers_;
   std::vector<Clock::time_point> restarts_;
+  bool recorder_missed_ = false;  // it ended, and that was said
   std::optional<common::ChildProcess> world_process_, coordinator_process_, recorder_process_;
 };
 

@@ -55,8 +55,8 @@ std::size_t bytes_of(const msg::Assignment& assignment) {
   return bytes + 8 * numbers;
 }
 
-Result<void> check_samples(const msg::Assignment& assignment) {
-  const std::uint32_t first = assignment.batch().first_sample(), count = assignment.batch().samples();
+Result<void> check_samples(const msg::Assignment& assignment, const RolloutBatch& batch) {
+  const std::uint32_t first = batch.first_sample, count = batch.samples;
   if (assignment.samples().empty() || assignment.samples().size() > count) {
     return Error{Code::kInvalidArgument,
                  fmt::format("assignment.samples: got {} of them, wanted 1 to {}", assignment.samples().size(), count)};
@@ -182,9 +182,9 @@ void WorkerService::examine(Arrival arrival) {
 
 // Takes the batch out of the message, and looks at what can be said of it without its world.
 Result<void> WorkerService::judge(Arrival& arrival) const {
-  if (auto ok = check_samples(arrival.assignment); !ok) return ok;
   arrival.batch = wire::from_wire(std::move(arrival.assignment.batch()));
-  return physics_pool::validate(*arrival.batch);
+  if (auto ok = physics_pool::validate(*arrival.batch); !ok) return ok;
+  return check_samples(arrival.assignment, *arrival.batch);
 }
 
 void WorkerService::accept(Arrival& arrival, WorldPtr world) {

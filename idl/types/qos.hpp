@@ -20,11 +20,12 @@ struct Qos {
   /// The writer keeps its last samples for late readers that ask, as recorders do; the
   /// system's own readers of the topic do not.
   bool retained = false;
-  int depth = 10;         ///< samples kept per instance (keep-last)
-  int instances = 1;      ///< most keys of a keyed type; the middleware's default is 10
-  std::string_view kind;  ///< its profile's name in the file; empty: the file does not matter
+  int depth = 10;           ///< samples kept per instance (keep-last)
+  int instances = 1;        ///< most keys of a keyed type, of one writer; the middleware's default is 10
+  int instances_heard = 1;  ///< of all writers that a reader hears, if more; some 200 bytes each
+  std::string_view kind;    ///< its profile's name in the file; empty: the file does not matter
 
-  /// Whether the promises are equal, by whatever name.
+  /// Whether the promises are equal, by whatever name. What a reader has room for is none.
   bool operator==(const Qos& other) const {
     return reliable == other.reliable && latched == other.latched && retained == other.retained &&
            depth == other.depth && instances == other.instances;
@@ -46,8 +47,10 @@ inline constexpr Qos kStream{.reliable = false, .depth = 1, .kind = "stream"};
 /// kState is for states that people and recorders follow. The samples kept cover the time that a recorder's discovery
 /// takes.
 inline constexpr Qos kState{.retained = true, .kind = "state"};
-/// kCatalogue keeps one latched sample per key.
-inline constexpr Qos kCatalogue{.latched = true, .depth = 1, .instances = 4096, .kind = "catalogue"};
+/// kCatalogue keeps one latched sample per key. Readers have room for many writers' keys: where there is none, the next
+/// writer's would never arrive.
+inline constexpr Qos kCatalogue{
+    .latched = true, .depth = 1, .instances = 4096, .instances_heard = 1 << 20, .kind = "catalogue"};
 
 inline constexpr std::array kKinds{kTask, kCommand, kAnswer, kLatched, kStream, kState, kCatalogue};
 

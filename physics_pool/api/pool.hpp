@@ -22,7 +22,10 @@ using jostle::TimePoint;
 
 /// One worker as its pool sees it. In a pool of threads each thread counts as a worker.
 struct WorkerStatus {
+  std::uint64_t id = 0;  ///< different for any two workers of a pool, whatever their names
   std::string name;
+  std::string host;                ///< empty for a thread
+  std::uint32_t pid = 0;           ///< of its process; 0 for a thread
   int capacity = 1;                ///< rollouts at a time
   std::uint64_t rollouts = 0;      ///< finished for this client
   std::uint64_t engine_steps = 0;  ///< physics steps of those

@@ -6,7 +6,7 @@ namespace jostle::physics_pool {
 
 ThreadPool::ThreadPool(int threads) : executor_(threads) {
   for (int i = 0; i < executor_.threads(); ++i) {
-    workers_.push_back({.name = fmt::format("thread-{}", i)});
+    workers_.push_back({.id = static_cast<std::uint64_t>(i) + 1, .name = fmt::format("thread-{}", i)});
   }
 }
 

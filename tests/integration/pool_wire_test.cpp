@@ -244,7 +244,7 @@ TEST(WorkerThatCannotAnswer, SaysSoAndLivesOn) {
   const auto ticket_result = sut.submit(batch, [](const auto&) {});
   ASSERT_TRUE(ticket_result);
 
-  EXPECT_TRUE(worker.says("results were not taken by the middleware", kPatience)) << worker.err();
+  EXPECT_TRUE(worker.says("a result was not taken by the middleware", kPatience)) << worker.err();
 
   // The client has it run again and again; other batches are served beside it.
   const auto small = sut.run(wait_batch(scene, 2, 0ns), in(kPatience));

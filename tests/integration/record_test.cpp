@@ -482,6 +482,30 @@ TEST_F(Record, OfAWholeRunIsOneOption) {
   EXPECT_THAT(run->err(), HasSubstr(bag()));
 }
 
+TEST_F(Record, RunWhoseRecorderStoodStillSaysWhatIsMissing) {
+  start({easy, "--workers", "1", "--parameters", plain, "--record", bag(), "--rate", "2"});
+  ASSERT_TRUE(soon(kPatience, [&] { return executed(1) || run->code(); })) << run->err();
+  kill(run->child("jostle_record"), SIGSTOP);
+
+  EXPECT_EQ(run->wait(kPatience), 3) << run->err();
+
+  EXPECT_THAT(run->out(), HasSubstr("SUCCESS"));
+  EXPECT_THAT(run->err(), HasSubstr("the recording " + bag() + " is not complete"));
+  EXPECT_THAT(run->err(), HasSubstr("messages of /task/observation"));
+  EXPECT_THAT(run->err(), HasSubstr("messages of /task/result"));
+}
+
+TEST_F(Record, RunWhoseRecorderDiedSaysSo) {
+  start({easy, "--workers", "1", "--parameters", plain, "--record", bag(), "--rate", "2"});
+  ASSERT_TRUE(soon(kPatience, [&] { return executed(1) || run->code(); })) << run->err();
+  kill(run->child("jostle_record"), SIGKILL);
+
+  EXPECT_EQ(run->wait(kPatience), 3) << run->err();
+
+  EXPECT_THAT(run->err(), HasSubstr("the recorder ended: killed by signal 9"));
+  EXPECT_THAT(run->err(), HasSubstr("the recording " + bag() + " is not complete"));
+}
+
 TEST_F(Record, StartedStoppedAndStartedAgainDuringARunChangesNothing) {
   const std::string result = folder.path() / "result.json";
   const std::vector<std::string> task{easy, "--workers", "2", "--parameters", plain, "--json", result};

@@ -265,15 +265,45 @@ TEST_F(SimulatedWorldProcess, DropsCommandsOfAnOlderEpochAndOnesAlreadyDone) {
   EXPECT_GT(first->q()[0], -0.33 + 5e-3);
 
   EXPECT_TRUE(commands.write(command(5, 1)));
-  EXPECT_TRUE(commands.write(command(4, 2)));
-  ASSERT_TRUE(sim->says("command 4/2 is stale (2 so far), dropped", kPatience)) << sim->err();
+  ASSERT_TRUE(sim->says("command 5/1 is stale, dropped", kPatience)) << sim->err();
   const auto after = status_that([](const RobotStatus& status) { return !status.busy(); });
   ASSERT_TRUE(after);
   EXPECT_EQ(after->epoch(), 5u);
   EXPECT_EQ(after->q(), first->q());
 
-  EXPECT_TRUE(commands.write(command(6, 1)));  // a new commander starts counting anew
-  EXPECT_TRUE(finished(6, 1)) << sim->err();
+  EXPECT_TRUE(commands.write(command(4, 1)));  // a new task counts anew; epochs have no order
+  EXPECT_TRUE(finished(4, 1)) << sim->err();
+  EXPECT_TRUE(commands.write(command(5, 2)));  // what is over stays over
+  ASSERT_TRUE(sim->says("command 5/2 is stale, dropped", kPatience)) << sim->err();
+}
+
+// Clocks may differ, or go back: what counts is who is there.
+TEST_F(SimulatedWorldProcess, ObeysANewcomerOnceItsCommanderHasGone) {
+  EXPECT_TRUE(commands.write(command(5, 1)));
+  ASSERT_TRUE(finished(5, 1)) << sim->err();
+  const auto coordinator = program("jostle_coordinator", {"--pool", "threads", "--threads", "1"});
+  wire::Writer<Goal> goals{participant, wire::topics::kTaskGoal};
+  wire::Inbox<GoalResult> results{participant, wire::topics::kTaskResult, 64};
+  ASSERT_TRUE(goals.wait_for_readers(deadline())) << coordinator->err();
+  ASSERT_TRUE(soon(kPatience, [&] { return results.matched() == 1; }));
+  Goal goal;
+  goal.goal_id("act");
+  goal.execution_scene(contents(easy));
+  goal.planning_scene(contents(easy));
+  goal.parameters("control: {many_iterations: 10}\n");
+  goal.controller("or");
+
+  EXPECT_TRUE(goals.write(goal));
+  const auto refused = results.take(deadline());
+  ASSERT_TRUE(refused);
+  EXPECT_THAT(refused->error(), HasSubstr("robot: it obeys another commander, of epoch 5"));
+
+  { const auto gone = std::move(commands); }
+  goal.goal_id("act again");
+  EXPECT_TRUE(goals.write(goal));
+  const auto result = results.take(deadline());
+  ASSERT_TRUE(result);
+  EXPECT_TRUE(result->success()) << result->error() << sim->err();
 }
 
 TEST_F(SimulatedWorldProcess, BadCommandOfAStrangerIsNotTheCommandersError) {

@@ -79,6 +79,26 @@ inline bool lives(pid_t pid) {
   return entry && entry->state != 'Z' && entry->state != 'X';
 }
 
+/// The most memory a process had at a time, MB; 0 if it is gone.
+inline std::size_t peak_memory(pid_t pid) {
+  std::istringstream lines(contents(std::filesystem::path("/proc") / std::to_string(pid) / "status"));
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("VmHWM:")) return std::stoul(line.substr(6)) >> 10;
+  }
+  return 0;
+}
+
+/// Processor time a process has used so far, in seconds.
+inline double processor_time(pid_t pid) {
+  const std::string stat = contents(std::filesystem::path("/proc") / std::to_string(pid) / "stat");
+  std::istringstream fields(stat.substr(std::min(stat.size(), stat.rfind(')') + 1)));
+  std::string skipped;
+  for (int i = 3; i < 14; ++i) fields >> skipped;  // proc(5): 14 and 15 are utime and stime
+  double user = 0.0, system = 0.0;
+  fields >> user >> system;
+  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
 /// One of our programs, its output kept. At the end of its scope it and every
 /// child it was seen to have are killed.
 class ProgramProcess {

@@ -70,13 +70,17 @@ Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
 }
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept
-    : pid_(std::exchange(other.pid_, -1)), log_(std::move(other.log_)), ended_(std::move(other.ended_)) {}
+    : pid_(std::exchange(other.pid_, -1)),
+      log_(std::move(other.log_)),
+      ended_(std::move(other.ended_)),
+      told_(other.told_) {}
 
 ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
   end();
   pid_ = std::exchange(other.pid_, -1);
   log_ = std::move(other.log_);
   ended_ = std::move(other.ended_);
+  told_ = other.told_;
   return *this;
 }
 
@@ -99,6 +103,7 @@ ExitStatus ChildProcess::wait() { return reap(0).value_or(ExitStatus{}); }
 
 void ChildProcess::terminate() {
   if (pid_ > 0 && !ended()) {
+    if (!told_) told_ = std::chrono::steady_clock::now();
     kill(pid_, SIGTERM);
     kill(pid_, SIGCONT);  // a stopped process takes no signal
   }
@@ -120,7 +125,10 @@ bool ChildProcess::has_said(const std::string& text) const {
 
 void ChildProcess::end() {
   terminate();
-  if (pid_ < 0 || wait_for(kPatience)) return;
+  const auto waited = std::chrono::steady_clock::now() - told_.value_or(std::chrono::steady_clock::now());
+  if (pid_ < 0 || wait_for(std::max(kPatience - std::chrono::duration_cast<std::chrono::milliseconds>(waited),
+                                    std::chrono::milliseconds(0))))
+    return;
   kill(pid_, SIGKILL);
   wait();
 }

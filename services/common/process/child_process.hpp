@@ -27,7 +27,7 @@ struct ExitStatus {
 /// A running child. It has a process group of its own, so that Ctrl-C in the
 /// terminal reaches only its parent; its output goes to a log file.
 ///
-/// Destroying it ends the child: SIGTERM, and SIGKILL after two seconds.
+/// Destroying it ends the child: SIGTERM, and SIGKILL two seconds after the first one.
 class ChildProcess {
  public:
   /// Error kNotFound if the program cannot be started; names it.
@@ -66,6 +66,7 @@ class ChildProcess {
   pid_t pid_ = -1;  // -1: moved from, or seen to have ended
   std::filesystem::path log_;
   std::optional<ExitStatus> ended_;
+  std::optional<std::chrono::steady_clock::time_point> told_;  // to end, for the first time
 };
 
 /// Runs a program of the system to its end; it writes to `log`.

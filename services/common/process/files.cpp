@@ -9,6 +9,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "services/common/process/program.hpp"
+
 namespace jostle::common {
 
 namespace fs = std::filesystem;
@@ -59,7 +61,10 @@ Result<fs::path> make_temporary_folder(const std::string& purpose) {
   const fs::path parent = fs::temp_directory_path(problem);
   if (problem) return Error{Code::kIo, fmt::format("TMPDIR: got '{}', wanted a folder", parent.string())};
   std::string name = (parent / fmt::format("jostle-{}-XXXXXX", purpose)).string();
-  if (mkdtemp(name.data())) return fs::path(name);
+  if (mkdtemp(name.data())) {
+    remove_at_abrupt_end(name);
+    return fs::path(name);
+  }
   return Error{Code::kIo, fmt::format("{}: cannot be made: {}", name, std::strerror(errno))};
 }
 

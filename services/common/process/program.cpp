@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/prctl.h>
 #include <unistd.h>
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 
@@ -15,6 +16,7 @@
 #include <mutex>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "services/common/process/domain.hpp"
 
@@ -36,6 +38,31 @@ sigset_t stop_signals() {
   return set;
 }
 
+// What goes when the process ends all of a sudden.
+struct Leftovers {
+  std::mutex mutex;  // guards paths
+  std::vector<std::filesystem::path> paths;
+};
+
+Leftovers& leftovers() {
+  static auto* all = new Leftovers;  // never destroyed: a thread may need it until the very end
+  return *all;
+}
+
+// On a thread of its own, which nothing that hangs can hold up.
+void end_after(std::chrono::milliseconds patience) {
+  std::this_thread::sleep_for(patience);
+  const std::string line =
+      fmt::format("{}: did not end within {:.1f} s of the signal, some thread hangs; ends at once\n",
+                  program_invocation_short_name, static_cast<double>(patience.count()) / 1e3);
+  [[maybe_unused]] const auto written = write(STDERR_FILENO, line.data(), line.size());
+  if (const std::unique_lock lock(leftovers().mutex, std::try_to_lock); lock) {
+    std::error_code ignored;
+    for (const auto& path : leftovers().paths) std::filesystem::remove_all(path, ignored);
+  }
+  _exit(kExitBroken);
+}
+
 // Not an error: with few programs on a host it goes well most of the time.
 void warn_of_ports(std::optional<int> wanted) {
   const auto domain_result = choose_domain(wanted);
@@ -48,12 +75,13 @@ void warn_of_ports(std::optional<int> wanted) {
 
 // Blocked in every thread and waited for in one: a stop request takes locks,
 // which a signal handler must not.
-StopSignal::StopSignal() {
+StopSignal::StopSignal(std::chrono::milliseconds patience) {
   const sigset_t set = stop_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
-  std::thread([set] {
+  std::thread([set, patience] {
     int signal = 0;
     sigwait(&set, &signal);
+    std::thread(end_after, patience).detach();
     stop_source().request_stop();
     // A second one ends a program that does not end by itself; not one that comes with the
     // first: timeout(1) sends its signal twice.
@@ -67,6 +95,11 @@ StopSignal::StopSignal() {
 }
 
 std::stop_token StopSignal::token() const { return stop_source().get_token(); }
+
+void remove_at_abrupt_end(const std::filesystem::path& path) {
+  const std::lock_guard lock(leftovers().mutex);
+  leftovers().paths.push_back(path);
+}
 
 void wait_for(std::stop_token stop) { pause_until(std::chrono::steady_clock::time_point::max(), std::move(stop)); }
 

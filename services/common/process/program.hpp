@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -28,14 +29,22 @@ enum ExitCode : int {
 
 /// Turns SIGINT and SIGTERM into a stop request for the whole process. Another one, half a
 /// second later or more, ends it on the spot. Make one in main before any thread starts.
+///
+/// A program that has not ended `patience` after the signal, because a thread hangs, says so, removes its temporary
+/// folders and ends with kExitBroken.
 class StopSignal {
  public:
-  StopSignal();
+  static constexpr std::chrono::milliseconds kPatience{4500};
+
+  explicit StopSignal(std::chrono::milliseconds patience = kPatience);
   StopSignal(const StopSignal&) = delete;
   StopSignal& operator=(const StopSignal&) = delete;
 
   std::stop_token token() const;
 };
+
+/// Has a file or folder removed if the process does not end in an orderly way after a StopSignal.
+void remove_at_abrupt_end(const std::filesystem::path& path);
 
 /// Returns once a stop was requested.
 void wait_for(std::stop_token stop);

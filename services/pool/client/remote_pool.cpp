@@ -4,8 +4,10 @@
 
 #include <algorithm>
 
+#include "services/common/process/random_id.hpp"
 #include "services/pool/protocol.hpp"
 #include "services/wire/convert/pool.hpp"
+#include "services/wire/limits.hpp"
 
 namespace jostle::pool {
 
@@ -16,6 +18,7 @@ using physics_pool::RolloutBatch;
 using physics_pool::RolloutOutcome;
 
 namespace msg = jostle_msgs::msg;
+namespace limits = wire::limits;
 
 namespace {
 
@@ -60,6 +63,9 @@ struct RemotePool::Active {
   TimePoint started;
   OnReply on_reply;
   bool ended = false;
+  TimePoint progress;               // a sample came back, or it began
+  std::optional<TimePoint> missed;  // since then the first time a worker could not do its part
+  bool said = false;                // that there is no progress
 };
 
 RemotePool::RemotePool(const wire::Participant& participant, const RemotePoolOptions& options)
@@ -68,29 +74,77 @@ RemotePool::RemotePool(const wire::Participant& participant, const RemotePoolOpt
       client_(participant.id()),
       scheduler_(options.scheduler),
       // Results for an earlier process with our participant's id must not fit.
-      last_epoch_(random_id() >> 16),
+      last_epoch_(common::random_id() >> 16),
       last_usable_(std::chrono::steady_clock::now()),
       world_writer_(participant, wire::topics::kPoolWorld),
       control_writer_(participant, wire::topics::kPoolControl),
       result_reader_(participant, wire::topics::kPoolResult,
-                     [this](const msg::AssignmentResult& result) {
-                       if (result.client() != client_) return;
-                       const auto now = std::chrono::steady_clock::now();
-                       const std::lock_guard lock(mutex_);
-                       results_.push_back({result, now});
-                       kick();
+                     [this](msg::AssignmentResult& result, const wire::Origin& origin) {
+                       if (result.client() == client_) take_in(std::move(result), origin.participant);
                      }),
       heartbeat_reader_(participant, wire::topics::kPoolWorker,
-                        [this](const msg::WorkerHeartbeat& heartbeat) {
-                          const std::lock_guard lock(mutex_);
-                          heartbeats_.push_back(heartbeat);
-                          // Those of hundreds of workers, thousands a second, are absorbed several at a time.
-                          if (heartbeat.capacity() == 0 || std::chrono::steady_clock::now() > last_turn_ + kTogether)
-                            kick();
+                        [this](const msg::WorkerHeartbeat& heartbeat, const wire::Origin& origin) {
+                          take_in(heartbeat, origin.participant);
                         }),
       dispatcher_([this](std::stop_token stop) { dispatch(stop); }) {}
 
 RemotePool::~RemotePool() = default;
+
+void RemotePool::take_in(msg::AssignmentResult&& result, std::uint64_t writer) {
+  const auto now = std::chrono::steady_clock::now();
+  const std::lock_guard lock(mutex_);
+  const auto owner = participants_.find(result.worker());
+  if (owner == participants_.end() || owner->second != writer) {
+    foreign_.note("a result of worker {:016x} was dropped: participant {:016x} wrote it", result.worker(), writer);
+    return;
+  }
+  if (results_.size() >= limits::kUnreadResults) {  // the worker's heartbeats tell that it is not there any more
+    unread_.note("a result of worker {:016x} was dropped: {} are unread", result.worker(), results_.size());
+    return;
+  }
+  results_.push_back({std::move(result), now});
+  kick();
+}
+
+void RemotePool::take_in(const msg::WorkerHeartbeat& heartbeat, std::uint64_t writer) {
+  const std::lock_guard lock(mutex_);
+  if (!admit(heartbeat.worker(), writer)) return;
+  Heartbeat news{.name = common::shown(heartbeat.name(), limits::kShown),
+                 .host = common::shown(heartbeat.host(), limits::kShown),
+                 .pid = heartbeat.pid(),
+                 .capacity = heartbeat.capacity()};
+  for (const msg::ClientLoad& load : heartbeat.clients()) {
+    if (load.client() == client_) {
+      news.hears_us = true;
+      news.samples = load.samples();
+    } else {
+      news.others += load.samples();
+    }
+  }
+  heartbeats_[heartbeat.worker()] = std::move(news);
+  // Those of hundreds of workers, thousands a second, are absorbed several at a time.
+  if (heartbeat.capacity() == 0 || std::chrono::steady_clock::now() > last_turn_ + kTogether) kick();
+}
+
+// Whether this participant may speak for this worker.
+bool RemotePool::admit(WorkerId worker, std::uint64_t writer) {
+  const auto owner = participants_.find(worker);
+  if (owner != participants_.end()) {
+    if (owner->second == writer) return true;
+    foreign_.note("a heartbeat of worker {:016x} was dropped: participant {:016x} wrote it", worker, writer);
+    return false;
+  }
+  std::size_t& count = workers_of_[writer];
+  if (count < limits::kWorkersPerParticipant && participants_.size() < limits::kWorkers) {
+    ++count;
+    participants_.emplace(worker, writer);
+    return true;
+  }
+  too_many_.note("worker {:016x} was ignored: got {} of its participant and {} in all, wanted at most {} and {}",
+                 worker, count, participants_.size(), limits::kWorkersPerParticipant, limits::kWorkers);
+  if (count == 0) workers_of_.erase(writer);
+  return false;
+}
 
 void RemotePool::kick() {
   kicked_ = true;
@@ -103,6 +157,11 @@ Result<Hash> RemotePool::load(const physics_pool::Scene& scene) {
   {
     const std::lock_guard lock(mutex_);
     if (worlds_.contains(hash)) return hash;
+  }
+  if (text.size() > limits::kText) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("scene '{}': its text has {} bytes, workers take at most {}; simplify its meshes",
+                             scene.name, text.size(), limits::kText)};
   }
   if (auto ok = physics_pool::validate(scene, fmt::format("scene '{}'", scene.name)); !ok) {
     return ok.error();
@@ -157,7 +216,7 @@ Result<std::unique_ptr<physics_pool::AsyncPool::Ticket>> RemotePool::submit(cons
   active->batch = batch;
   active->wire = wire::to_wire(batch);
   active->on_reply = std::move(on_reply);
-  active->started = std::chrono::steady_clock::now();
+  active->started = active->progress = std::chrono::steady_clock::now();
   active->reply.outcomes.resize(batch.samples);
   for (std::uint32_t i = 0; i < batch.samples; ++i) {
     active->reply.outcomes[i].sample = batch.first_sample + i;
@@ -172,8 +231,11 @@ Error RemotePool::no_worker() const {
   const double seconds = std::chrono::duration<double>(options_.no_worker_timeout).count();
   std::string message = fmt::format("no {} for {:g} s on domain {}; start one with `jostle worker`",
                                     ever_heard_ ? "usable worker" : "worker heard", seconds, participant_.domain());
-  if (!last_refusal_.empty()) message += fmt::format(" (last trouble: {})", last_refusal_);
-  return {Code::kUnavailable, std::move(message)};
+  return {Code::kUnavailable, message + last_trouble()};
+}
+
+std::string RemotePool::last_trouble() const {
+  return last_refusal_.empty() ? "" : fmt::format(" (last trouble: {})", last_refusal_);
 }
 
 void RemotePool::give_up_without_workers(TimePoint now) {
@@ -182,6 +244,27 @@ void RemotePool::give_up_without_workers(TimePoint now) {
     if (now >= std::max(last_usable_, active->started) + options_.no_worker_timeout) hopeless.push_back(active);
   }
   for (const auto& active : hopeless) finish(*active, no_worker());
+}
+
+// A batch waits as long as some worker has samples of ours, however long they take. It gets nowhere when none has, or
+// when all that workers do is to refuse.
+void RemotePool::watch_progress(TimePoint now) {
+  std::vector<std::shared_ptr<Active>> hopeless;
+  for (const auto& [epoch, active] : active_) {
+    const TimePoint since = active->missed.value_or(std::max(active->progress, scheduler_.last_held()));
+    const bool late = now >= since + limits::kBatchSaysSo || now >= active->progress + limits::kBatchIsSlow;
+    if (late && !std::exchange(active->said, true) && options_.on_trouble) {
+      const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(now - active->progress).count();
+      options_.on_trouble(fmt::format("no rollout came back for {} s; usable workers: {}{}", seconds,
+                                      scheduler_.usable_workers(now), last_trouble()));
+    }
+    if (now >= since + limits::kBatchGivesUp) hopeless.push_back(active);
+  }
+  for (const auto& active : hopeless) {
+    finish(*active, Error{Code::kUnavailable,
+                          fmt::format("no rollout came back for {} s and none is under way; usable workers: {}{}",
+                                      limits::kBatchGivesUp.count(), scheduler_.usable_workers(now), last_trouble())});
+  }
 }
 
 void RemotePool::finish(Active& active, Result<BatchReply> reply) {
@@ -209,8 +292,14 @@ void RemotePool::dispatch(std::stop_token stop) {
     absorb_results(now);  // before heartbeats, which say what is still missing
     absorb_heartbeats(now, strangers);
     const std::vector<WorkerId> forgotten = scheduler_.check_silence(now);
+    for (const WorkerId worker : forgotten) {
+      const auto owner = participants_.find(worker);
+      if (--workers_of_.at(owner->second) == 0) workers_of_.erase(owner->second);
+      participants_.erase(owner);
+    }
     if (scheduler_.usable_workers(now) > 0) last_usable_ = now;
     give_up_without_workers(now);
+    watch_progress(now);
     prepare_assignments(now);
     const Outgoing outgoing = std::exchange(outgoing_, {});
 
@@ -218,6 +307,9 @@ void RemotePool::dispatch(std::stop_token stop) {
     send(outgoing);
     connect(strangers);
     for (const WorkerId worker : forgotten) assignment_writers_.erase(worker);
+    foreign_.say();
+    too_many_.say();
+    unread_.say();
     lock.lock();
   }
 }
@@ -246,19 +338,18 @@ void RemotePool::send(const Outgoing& outgoing) {
 }
 
 void RemotePool::absorb_heartbeats(TimePoint now, std::vector<WorkerId>& strangers) {
-  for (const msg::WorkerHeartbeat& heartbeat : std::exchange(heartbeats_, {})) {
-    const auto writer = assignment_writers_.find(heartbeat.worker());
-    if (writer == assignment_writers_.end()) strangers.push_back(heartbeat.worker());
-    const auto us = std::ranges::find(heartbeat.clients(), client_, [](const auto& load) { return load.client(); });
-    const bool hears_us = us != heartbeat.clients().end();
-    std::uint64_t others = 0;
-    for (const msg::ClientLoad& load : heartbeat.clients()) others += load.client() == client_ ? 0 : load.samples();
-    scheduler_.heard({.worker = heartbeat.worker(),
-                      .name = heartbeat.name(),
-                      .capacity = static_cast<int>(std::min<std::uint32_t>(heartbeat.capacity(), INT32_MAX)),
-                      .ready = hears_us && writer != assignment_writers_.end() && writer->second.matched() > 0,
-                      .samples = hears_us ? us->samples() : 0,
-                      .others = others},
+  for (auto& [worker, heartbeat] : std::exchange(heartbeats_, {})) {
+    const auto writer = assignment_writers_.find(worker);
+    const bool connected = writer != assignment_writers_.end();
+    if (!connected && strangers.size() < limits::kNewWorkersPerTurn) strangers.push_back(worker);
+    scheduler_.heard({.worker = worker,
+                      .name = std::move(heartbeat.name),
+                      .host = std::move(heartbeat.host),
+                      .pid = heartbeat.pid,
+                      .capacity = static_cast<int>(std::min<std::uint32_t>(heartbeat.capacity, INT32_MAX)),
+                      .ready = heartbeat.hears_us && connected && writer->second.matched() > 0,
+                      .samples = heartbeat.samples,
+                      .others = heartbeat.others},
                      now);
     ever_heard_ = true;
     changed_.notify_all();
@@ -266,7 +357,7 @@ void RemotePool::absorb_heartbeats(TimePoint now, std::vector<WorkerId>& strange
 }
 
 void RemotePool::absorb_results(TimePoint now) {
-  for (const Received& received : std::exchange(results_, {})) absorb(received, now);
+  for (Received& received : std::exchange(results_, {})) absorb(std::move(received), now);
 }
 
 void RemotePool::trace(const Received& received, bool first) const {
@@ -288,8 +379,8 @@ void RemotePool::trace(const Received& received, bool first) const {
                       .finished = seconds(result.finished())});
 }
 
-void RemotePool::absorb(const Received& received, TimePoint now) {
-  const msg::AssignmentResult& result = received.result;
+void RemotePool::absorb(Received received, TimePoint now) {
+  msg::AssignmentResult& result = received.result;
   const auto found = active_.find(result.epoch());
   if (found == active_.end()) {
     scheduler_.accept(result.worker(), result.epoch(), result.sample(), 0, now);  // late: counted
@@ -297,29 +388,39 @@ void RemotePool::absorb(const Received& received, TimePoint now) {
     return;
   }
   const std::shared_ptr<Active> active = found->second;
-  auto outcome_result = wire::from_wire(result);
   const bool refused = !result.error().empty();
-  if (refused && outcome_result.error().code != Code::kUnknownWorld) {
+  auto outcome_result = wire::from_wire(std::move(result));  // its numbers stay readable
+  if (refused) {
     const Error& error = outcome_result.error();
-    finish(*active, Error{error.code, fmt::format("worker {:016x}: {}", result.worker(), error.message)});
-    return;
+    const std::string why = common::shown(error.message, limits::kShownError);
+    // A world that did not come, a batch that somebody cancelled: others may do better.
+    if (error.code == Code::kUnknownWorld || error.code == Code::kCancelled)
+      return miss(*active, result.worker(), why, now);
+    return finish(*active, Error{error.code, fmt::format("worker {:016x}: {}", result.worker(), why)});
   }
   if (!outcome_result || !fits(active->batch, *outcome_result)) {
-    // Others may do better; the batch is given up when nobody is left.
-    last_refusal_ = fmt::format("worker {:016x}: {}", result.worker(),
-                                outcome_result ? "its result does not fit the batch" : outcome_result.error().message);
-    scheduler_.bench(result.worker(), now);
-    return;
+    return miss(*active, result.worker(),
+                outcome_result ? "its result does not fit the batch" : outcome_result.error().message, now);
   }
   const bool first = scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps(), now,
                                        std::chrono::duration<double>(1e-9 * (static_cast<double>(result.finished()) -
                                                                              static_cast<double>(result.started()))));
   trace(received, first);
   if (!first) return;
+  active->progress = now;
+  active->missed.reset();
+  if (std::exchange(active->said, false) && options_.on_trouble) options_.on_trouble("");
   adopt(*active, std::move(outcome_result).value());
   if (scheduler_.missing(active->epoch) > 0) return;
   active->reply.winner = physics_pool::select_winner(active->reply.outcomes, active->batch.incumbent);
   finish(*active, std::move(active->reply));
+}
+
+// Others may do better; the batch is given up when nobody is left, or nothing comes of it.
+void RemotePool::miss(Active& active, WorkerId worker, const std::string& why, TimePoint now) {
+  last_refusal_ = fmt::format("worker {:016x}: {}", worker, why);
+  if (!active.missed) active.missed = now;
+  scheduler_.bench(worker, now);
 }
 
 // Keeps an outcome and tells the siblings what it means for them.

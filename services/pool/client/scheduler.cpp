@@ -24,12 +24,16 @@ constexpr int kEmptyHeartbeats = 2;                     // the first may have cr
 
 void Scheduler::heard(const WorkerNews& news, TimePoint now) {
   Worker& worker = workers_[news.worker];
+  worker.status.id = news.worker;
   worker.status.name = news.name;
+  worker.status.host = news.host;
+  worker.status.pid = news.pid;
   worker.status.alive = news.capacity > 0;
   worker.ready = news.ready;
   worker.others = news.others;
   worker.last_heard = now;
   if (!worker.status.alive) return take_back(worker, now);
+  if (news.samples > 0) last_held_ = now;
   worker.status.capacity = std::clamp(news.capacity, 1, kLargestCapacity);
 
   const bool waiting = !worker.outstanding.empty() && worker.outstanding.front().since + options_.lost_after < now;

@@ -29,7 +29,8 @@ struct Assignment {
 /// What a heartbeat says, as far as scheduling goes.
 struct WorkerNews {
   WorkerId worker = 0;
-  std::string name;
+  std::string name, host;
+  std::uint32_t pid = 0;
   int capacity = 1;           ///< rollouts at a time; 0: it takes its leave
   bool ready = false;         ///< it hears us, and we hear it
   std::uint32_t samples = 0;  ///< our samples that are queued or running there
@@ -77,6 +78,8 @@ class Scheduler {
   /// Declares silent workers dead; returns those forgotten for good.
   std::vector<WorkerId> check_silence(TimePoint now);
   int usable_workers(TimePoint now) const;
+  /// Returns when a worker last said that it has samples of ours.
+  TimePoint last_held() const { return last_held_; }
 
   /// Takes in a batch of `samples` samples, numbered from `first_sample` on.
   void start(Epoch epoch, std::uint32_t first_sample, std::uint32_t samples,
@@ -156,6 +159,7 @@ class Scheduler {
   std::map<WorkerId, Worker> workers_;
   std::map<Epoch, Batch> batches_;
   Epoch last_served_ = 0;
+  TimePoint last_held_;
   std::uint64_t urgent_in_a_row_ = 0;               // samples handed out
   std::chrono::duration<double> typical_{0.0};      // from handing out to coming back, lately
   std::chrono::duration<double> typical_run_{0.0};  // how long samples lately ran; 0: not known

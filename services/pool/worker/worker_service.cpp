@@ -6,10 +6,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <iterator>
+#include <utility>
 
 #include "services/common/process/program.hpp"
+#include "services/common/process/random_id.hpp"
+#include "services/common/results/results.hpp"
 #include "services/pool/protocol.hpp"
 #include "services/wire/convert/pool.hpp"
+#include "services/wire/limits.hpp"
 
 namespace jostle::pool {
 
@@ -18,13 +24,12 @@ using physics_pool::RolloutOutcome;
 using physics_pool::WorldPtr;
 
 namespace msg = jostle_msgs::msg;
+namespace limits = wire::limits;
 
 namespace {
 
 constexpr std::chrono::seconds kWorldPatience{5};  // a latched text arrives in milliseconds
 constexpr std::chrono::milliseconds kRetry{20};    // while a world is waited for
-constexpr std::size_t kArrivals = 1024;            // unread assignments; credit keeps honest clients far below
-constexpr std::chrono::seconds kComplaints{1};     // between two log lines about losses
 constexpr std::size_t kCancelled = 64;             // cancelled batches remembered
 
 std::int64_t nanoseconds(std::chrono::steady_clock::time_point time) {
@@ -37,8 +42,21 @@ std::string host_name() {
   return name;
 }
 
-Result<void> check_samples(const msg::Assignment& assignment) {
-  const std::uint32_t first = assignment.batch().first_sample(), count = assignment.batch().samples();
+// About what an assignment takes in memory.
+std::size_t bytes_of(const msg::Assignment& assignment) {
+  const msg::BatchDescription& batch = assignment.batch();
+  std::size_t numbers = batch.q().size() + batch.v().size() + batch.nominal().size() + batch.u_before().size() +
+                        batch.sigma().size() + batch.limit().size() + batch.scales().size();
+  std::size_t bytes = sizeof(msg::Assignment) + 4 * (batch.draws().size() + assignment.samples().size());
+  for (const msg::Term& term : batch.terms()) {
+    numbers += term.values().size();
+    bytes += sizeof term + term.kind().size();
+  }
+  return bytes + 8 * numbers;
+}
+
+Result<void> check_samples(const msg::Assignment& assignment, const RolloutBatch& batch) {
+  const std::uint32_t first = batch.first_sample, count = batch.samples;
   if (assignment.samples().empty() || assignment.samples().size() > count) {
     return Error{Code::kInvalidArgument,
                  fmt::format("assignment.samples: got {} of them, wanted 1 to {}", assignment.samples().size(), count)};
@@ -57,7 +75,8 @@ Result<void> check_samples(const msg::Assignment& assignment) {
 }  // namespace
 
 WorkerService::WorkerService(const wire::Participant& participant, const WorkerOptions& options)
-    : id_(random_id()),
+    : participant_(participant),
+      id_(common::random_id()),
       name_(options.name.empty() ? fmt::format("{}-{}", host_name(), getpid()) : options.name),
       host_(host_name()),
       threads_(std::max(options.threads, 1)),
@@ -66,22 +85,16 @@ WorkerService::WorkerService(const wire::Participant& participant, const WorkerO
       heartbeat_writer_(participant, wire::topics::kPoolWorker),
       executor_(threads_, options.cores, (options.memory - options.memory / 4) / static_cast<std::size_t>(threads_)),
       world_reader_(participant, wire::topics::kPoolWorld,
-                    [this](const msg::WorldDescription& world) {
-                      worlds_.announce({.high = world.high(), .low = world.low()}, world.scene());
+                    [this](msg::WorldDescription& world, const wire::Origin& origin) {
+                      worlds_.announce({.high = world.high(), .low = world.low()}, std::move(world.scene()),
+                                       origin.participant);
                     }),
-      control_reader_(participant, wire::topics::kPoolControl,
-                      [this](const msg::BatchControl& control) { obey(control); }),
+      control_reader_(
+          participant, wire::topics::kPoolControl,
+          [this](const msg::BatchControl& control, const wire::Origin& origin) { obey(control, origin.participant); }),
       assignment_reader_(participant, wire::topics::pool_assignment(id_),
-                         [this](const Assignment& assignment) {
-                           const std::lock_guard lock(mutex_);
-                           if (arrivals_.size() >= kArrivals) {
-                             ++refused_;
-                             return;
-                           }
-                           arrivals_.push_back({assignment, std::chrono::steady_clock::now()});
-                           loads_[assignment.client()] += static_cast<std::uint32_t>(assignment.samples().size());
-                           kicked_ = true;
-                           wake_.notify_one();
+                         [this](Assignment& assignment, const wire::Origin& origin) {
+                           take_in(std::move(assignment), origin.participant);
                          }),
       server_([this](std::stop_token stop) { serve(stop); }),
       heart_([this](std::stop_token stop) { beat(stop); }) {}
@@ -93,57 +106,101 @@ WorkerService::~WorkerService() {
   for (const auto& [batch, running] : running_) running.run->signals.cancel();
 }
 
+// On the middleware's thread.
+void WorkerService::take_in(Assignment&& assignment, std::uint64_t writer) {
+  if (assignment.client() != writer) {
+    foreign_.note("an assignment of client {:016x} was dropped: participant {:016x} wrote it", assignment.client(),
+                  writer);
+    return;
+  }
+  const std::size_t bytes = bytes_of(assignment);
+  const std::lock_guard lock(mutex_);
+  Account& account = accounts_[writer];
+  if (const char* what = why_too_much(account, assignment, bytes)) {
+    ++refused_;
+    too_many_.note("{}: an assignment of client {:016x} was dropped: it has too many {} here; it may send it again",
+                   name_, writer, what);
+    return;
+  }
+  account.samples += static_cast<std::uint32_t>(assignment.samples().size());
+  ++account.arrivals;
+  account.arrival_bytes += bytes;
+  arrival_bytes_ += bytes;
+  arrivals_.push_back({std::move(assignment), std::chrono::steady_clock::now(), bytes});
+  kicked_ = true;
+  wake_.notify_one();
+}
+
+const char* WorkerService::why_too_much(const Account& account, const Assignment& assignment, std::size_t bytes) const {
+  if (account.arrivals >= limits::kWaitingPerClient) return "assignments unread or without their worlds";
+  if (account.samples + assignment.samples().size() > limits::kSamplesPerClient) return "samples";
+  if (account.batches >= limits::kBatchesPerClient && !running_.contains({assignment.client(), assignment.epoch()}))
+    return "batches";
+  const bool fits = account.arrival_bytes + bytes <= limits::kWaitingBytesPerClient &&
+                    arrival_bytes_ + bytes <= limits::kWaitingBytes;
+  return fits ? nullptr : "bytes waiting";
+}
+
 void WorkerService::serve(std::stop_token stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
     wake_.wait_for(lock, stop, kRetry, [&] { return kicked_; });
     kicked_ = false;
-    const std::deque<Arrival> arrivals = std::exchange(arrivals_, {});
+    std::deque<Arrival> arrivals = std::exchange(without_world_, {});
+    std::ranges::move(std::exchange(arrivals_, {}), std::back_inserter(arrivals));
     lock.unlock();
-    for (const Arrival& arrival : arrivals) examine(arrival);
+    for (Arrival& arrival : arrivals) examine(std::move(arrival));
     lock.lock();
     feed();
   }
 }
 
-// Judges an assignment; what is wrong with it goes back, what is right gets in line.
-void WorkerService::examine(const Arrival& arrival) {
-  const Assignment& assignment = arrival.assignment;
-  RolloutBatch batch = wire::from_wire(assignment.batch());
-  if (auto ok = physics_pool::validate(batch); !ok) return refuse(assignment, ok.error());
-  if (auto ok = check_samples(assignment); !ok) return refuse(assignment, ok.error());
-  const auto world_result = worlds_.find(batch.world);
+// What is wrong with an assignment goes back, what is right gets in line.
+void WorkerService::examine(Arrival arrival) {
+  if (!arrival.batch) {
+    if (auto ok = judge(arrival); !ok) return refuse(arrival, ok.error());
+  }
+  const auto world_result = worlds_.find(arrival.batch->world);
   if (!world_result) {
     if (std::chrono::steady_clock::now() - arrival.arrived > kWorldPatience) {
-      return refuse(assignment,
-                    Error{Code::kUnknownWorld,
-                          fmt::format("world: got {}, whose text did not arrive in {} s on {}", to_string(batch.world),
-                                      kWorldPatience.count(), wire::topics::kPoolWorld.name)});
+      return refuse(arrival,
+                    Error{Code::kUnknownWorld, fmt::format("world: got {}, whose text did not arrive in {} s on {}",
+                                                           to_string(arrival.batch->world), kWorldPatience.count(),
+                                                           wire::topics::kPoolWorld.name)});
     }
     const std::lock_guard lock(mutex_);
-    arrivals_.push_back(arrival);
+    without_world_.push_back(std::move(arrival));
     return;
   }
-  if (!*world_result) return refuse(assignment, world_result->error());
+  if (!*world_result) return refuse(arrival, world_result->error());
   const WorldPtr& world = world_result->value();
-  if (auto ok = physics_pool::validate(batch, world->geometry().layout, world->time_step()); !ok) {
-    return refuse(assignment, ok.error());
+  if (auto ok = physics_pool::validate(*arrival.batch, world->geometry().layout, world->time_step()); !ok) {
+    return refuse(arrival, ok.error());
   }
-  accept(arrival, std::move(batch), world);
+  accept(arrival, world);
 }
 
-void WorkerService::accept(const Arrival& arrival, RolloutBatch batch, WorldPtr world) {
-  const std::lock_guard lock(mutex_);
+// Takes the batch out of the message, and looks at what can be said of it without its world.
+Result<void> WorkerService::judge(Arrival& arrival) const {
+  arrival.batch = wire::from_wire(std::move(arrival.assignment.batch()));
+  if (auto ok = physics_pool::validate(*arrival.batch); !ok) return ok;
+  return check_samples(arrival.assignment, *arrival.batch);
+}
+
+void WorkerService::accept(Arrival& arrival, WorldPtr world) {
   const Assignment& assignment = arrival.assignment;
   const BatchId id{assignment.client(), assignment.epoch()};
+  std::unique_lock lock(mutex_);
   if (std::ranges::find(cancelled_, id) != cancelled_.end()) {
-    loads_[assignment.client()] -= static_cast<std::uint32_t>(assignment.samples().size());
-    return;
+    lock.unlock();  // who cancelled it does not mind an answer; who did not has to know
+    return refuse(arrival, {Code::kCancelled, fmt::format("batch {:x} was cancelled here", assignment.epoch())});
   }
+  looked_at(arrival);
   Running& running = running_[id];
   if (!running.run) {
+    ++accounts_.at(id.first).batches;
     running.run = std::make_shared<physics_pool::BatchRun>();
-    running.run->batch = std::move(batch);
+    running.run->batch = *std::move(arrival.batch);
     running.run->world = std::move(world);
     running.run->on_outcome = [this, id](const RolloutOutcome& outcome, const physics_pool::Shift& shift) {
       finish(id, outcome, shift);
@@ -160,12 +217,13 @@ void WorkerService::accept(const Arrival& arrival, RolloutBatch batch, WorldPtr 
     if (running.samples.try_emplace(sample, held).second) {
       turns_.wait(job);
     } else {
-      --loads_[assignment.client()];  // already here
+      --accounts_.at(id.first).samples;  // already here
     }
   }
 }
 
-void WorkerService::refuse(const Assignment& assignment, const Error& error) {
+void WorkerService::refuse(const Arrival& arrival, const Error& error) {
+  const Assignment& assignment = arrival.assignment;
   msg::AssignmentResult result;
   result.client(assignment.client());
   result.worker(id_);
@@ -174,10 +232,22 @@ void WorkerService::refuse(const Assignment& assignment, const Error& error) {
   result.sample(assignment.samples().empty() ? assignment.batch().first_sample() : assignment.samples().front());
   result.error(error.message);
   result.error_code(static_cast<std::uint8_t>(error.code));
-  const bool sent = result_writer_.write(result);
+  if (!result_writer_.write(result)) note_lost_result();
   const std::lock_guard lock(mutex_);
-  if (!sent) ++lost_results_;
-  loads_[assignment.client()] -= static_cast<std::uint32_t>(assignment.samples().size());
+  looked_at(arrival);
+  accounts_.at(assignment.client()).samples -= static_cast<std::uint32_t>(assignment.samples().size());
+}
+
+// It is no longer among the arrivals.
+void WorkerService::looked_at(const Arrival& arrival) {
+  Account& account = accounts_.at(arrival.assignment.client());
+  --account.arrivals;
+  account.arrival_bytes -= arrival.bytes;
+  arrival_bytes_ -= arrival.bytes;
+}
+
+void WorkerService::note_lost_result() {
+  lost_results_.note("{}: a result was not taken by the middleware and is lost; its sample will be run again", name_);
 }
 
 // Gives every free thread a sample. No earlier: a sample that comes while the
@@ -198,7 +268,6 @@ void WorkerService::feed() {
 void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, const physics_pool::Shift& shift) {
   const bool skipped =
       outcome.end == physics_pool::End::kSkipped;  // cancelled, or the client knows of the success that did it
-  bool sent = true;
   std::unique_lock lock(mutex_);
   const Held held = release(batch, outcome.sample);
   lock.unlock();
@@ -213,11 +282,12 @@ void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, 
     result.started(nanoseconds(shift.started));
     result.finished(nanoseconds(shift.finished));
     result.thread(static_cast<std::uint32_t>(shift.thread));
-    sent = result_writer_.write(result);
+    if (!result_writer_.write(result)) note_lost_result();
   }
   lock.lock();
-  if (!sent) ++lost_results_;
-  --loads_[batch.first];  // after the answer: a client may trust "nothing of yours is here"
+  Account& account = accounts_.at(batch.first);
+  --account.samples;  // after the answer: a client may trust "nothing of yours is here"
+  ++account.rollouts;
   ++rollouts_;
   engine_steps_ += outcome.engine_steps;
   turns_.done(held.job, shift.finished - shift.started, skipped);
@@ -231,11 +301,19 @@ WorkerService::Held WorkerService::release(const BatchId& batch, std::uint32_t s
   const auto found = running->second.samples.find(sample);
   const Held held = found->second;
   running->second.samples.erase(found);
-  if (running->second.samples.empty()) running_.erase(running);
+  if (running->second.samples.empty()) {
+    running_.erase(running);
+    --accounts_.at(batch.first).batches;
+  }
   return held;
 }
 
-void WorkerService::obey(const msg::BatchControl& control) {
+void WorkerService::obey(const msg::BatchControl& control, std::uint64_t writer) {
+  if (control.client() != writer) {
+    foreign_.note("news of a batch of client {:016x} was dropped: participant {:016x} wrote it", control.client(),
+                  writer);
+    return;
+  }
   const std::lock_guard lock(mutex_);
   const BatchId id{control.client(), control.epoch()};
   if (control.kind() == static_cast<std::uint8_t>(ControlKind::kCancel)) return cancel(id);
@@ -255,42 +333,52 @@ void WorkerService::cancel(const BatchId& batch) {
   running->second.run->signals.cancel();
   for (const Job& job : turns_.withdraw(batch.first, batch.second)) {
     release(batch, job.sample);
-    --loads_[batch.first];
+    --accounts_.at(batch.first).samples;
   }
 }
 
 void WorkerService::beat(std::stop_token stop) {
   do {
     const std::vector<std::uint64_t> clients = result_writer_.matched_participants();
+    say_who_is_served(clients);
     drop_lost_clients(clients);
     (void)heartbeat_writer_.write(heartbeat(clients));  // the next one comes soon; five lost ones make us dead
-    say_losses();
+    say_troubles();
   } while (common::pause_until(std::chrono::steady_clock::now() + kHeartbeatPeriod, stop));
+  say_who_is_served({});
   msg::WorkerHeartbeat leave = heartbeat({});
   leave.capacity(0);
   (void)heartbeat_writer_.write(leave);  // politeness: our silence says the same, later
 }
 
-// On this thread, not where they happen: a log may block.
-void WorkerService::say_losses() {
+void WorkerService::say_troubles() {
+  lost_results_.say();
+  too_many_.say();
+  foreign_.say();
+  worlds_.say_refusals();
+}
+
+// A line when a client begins, and one when it has gone.
+void WorkerService::say_who_is_served(const std::vector<std::uint64_t>& clients) {
   const auto now = std::chrono::steady_clock::now();
-  if (now < next_complaint_) return;
-  std::unique_lock lock(mutex_);
-  const std::uint64_t lost_results = lost_results_, refused = refused_;
-  lock.unlock();
-  if (lost_results == said_lost_results_ && refused == said_refused_) return;
-  next_complaint_ = now + kComplaints;
-  if (lost_results > said_lost_results_) {
-    spdlog::warn("{}: {} results were not taken by the middleware and are lost; their samples will be run again", name_,
-                 lost_results - said_lost_results_);
+  std::vector<std::string> lines;
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto& [client, account] : accounts_) {
+      const bool here = std::ranges::binary_search(clients, client);
+      if (here && account.name.empty() && account.batches > 0) {
+        const auto found = participant_.find(client);
+        account.name = fmt::format("client {:016x}{}", client, found ? fmt::format(" ({})", found->text()) : "");
+        account.began = now;
+        lines.push_back(fmt::format("{}: serves {}", name_, account.name));
+      }
+      if (here || account.name.empty()) continue;
+      const std::chrono::duration<double> time = now - account.began;
+      lines.push_back(fmt::format("{}: served {}: {} rollouts in {:.1f} s", name_, std::exchange(account.name, ""),
+                                  std::exchange(account.rollouts, 0), time.count()));
+    }
   }
-  if (refused > said_refused_) {
-    spdlog::warn(
-        "{}: {} assignments were dropped, for {} were unread or waited for their worlds; clients send them again",
-        name_, refused - said_refused_, kArrivals);
-  }
-  said_lost_results_ = lost_results;
-  said_refused_ = refused;
+  for (const std::string& line : lines) spdlog::info("{}", line);
 }
 
 void WorkerService::drop_lost_clients(const std::vector<std::uint64_t>& clients) {
@@ -300,7 +388,10 @@ void WorkerService::drop_lost_clients(const std::vector<std::uint64_t>& clients)
     if (!std::ranges::binary_search(clients, batch.first)) lost.push_back(batch);
   }
   for (const BatchId& batch : lost) cancel(batch);
-  std::erase_if(loads_, [](const auto& load) { return load.second == 0; });
+  std::erase_if(accounts_, [&](const auto& entry) {
+    const Account& account = entry.second;
+    return account.samples == 0 && account.arrivals == 0 && !std::ranges::binary_search(clients, entry.first);
+  });
 }
 
 msg::WorkerHeartbeat WorkerService::heartbeat(const std::vector<std::uint64_t>& clients) const {
@@ -310,16 +401,20 @@ msg::WorkerHeartbeat WorkerService::heartbeat(const std::vector<std::uint64_t>& 
   message.host(host_);
   message.pid(static_cast<std::uint32_t>(getpid()));
   message.capacity(static_cast<std::uint32_t>(threads_));
+  message.version(common::build());
+  double load = 0.0;
+  if (getloadavg(&load, 1) == 1) message.load(load);
   for (const Hash& world : worlds_.compiled()) message.worlds().push_back(wire::to_wire(world));
   const std::lock_guard lock(mutex_);
   message.rollouts(rollouts_);
   message.engine_steps(engine_steps_);
   message.refused(refused_);
+  message.busy(static_cast<std::uint32_t>(dealt_));
   for (const std::uint64_t client : clients) {
     msg::ClientLoad load;
     load.client(client);
-    const auto found = loads_.find(client);
-    load.samples(found == loads_.end() ? 0 : found->second);
+    const auto found = accounts_.find(client);
+    load.samples(found == accounts_.end() ? 0 : found->second.samples);
     message.clients().push_back(load);
   }
   return message;

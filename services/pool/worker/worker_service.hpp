@@ -8,12 +8,14 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "idl/types/time.hpp"
 #include "physics_pool/local/executor.hpp"
+#include "services/common/process/trouble.hpp"
 #include "services/pool/worker/turns.hpp"
 #include "services/pool/worker/world_store.hpp"
 #include "services/wire/dds/reader.hpp"
@@ -42,8 +44,10 @@ struct WorkerOptions {
 ///          whose world does not arrive in 5 s likewise. A client that is gone
 ///          has its samples dropped. A result that the middleware does not take is lost
 ///          and counted; its client sends the sample again, or to another worker. Assignments
-///          are lost and counted, too, once 1024 others were not looked at or wait for their
-///          worlds; the heartbeat says how many.
+///          are lost and counted, too, where their client has more here than limits.hpp
+///          allows; the heartbeat says how many.
+/// Trust    what a message says of its client is compared with who wrote it: nobody gives work
+///          or cancels it in another's name.
 class WorkerService {
  public:
   WorkerService(const wire::Participant& participant, const WorkerOptions& options);
@@ -62,6 +66,18 @@ class WorkerService {
   struct Arrival {
     Assignment assignment;
     TimePoint arrived;
+    std::size_t bytes = 0;                            // about
+    std::optional<physics_pool::RolloutBatch> batch;  // once it was looked at; it is no longer in the assignment then
+  };
+  /// What one client has here.
+  struct Account {
+    std::string name;           // as a log shows it
+    std::uint32_t samples = 0;  // arrived, waiting, running
+    std::size_t arrivals = 0;   // not looked at yet, or waiting for their worlds
+    std::size_t arrival_bytes = 0;
+    std::size_t batches = 0;     // of which samples wait or run
+    std::uint64_t rollouts = 0;  // done
+    TimePoint began;
   };
   /// A sample that waits or runs, and what its answer repeats of its assignment.
   struct Held {
@@ -76,43 +92,52 @@ class WorkerService {
     std::map<std::uint32_t, Held> samples;  // by index
   };
 
+  void take_in(Assignment&& assignment, std::uint64_t writer);
+  const char* why_too_much(const Account& account, const Assignment& assignment, std::size_t bytes) const;
   void serve(std::stop_token stop);
-  void examine(const Arrival& arrival);
-  void accept(const Arrival& arrival, physics_pool::RolloutBatch batch, physics_pool::WorldPtr world);
-  void refuse(const Assignment& assignment, const Error& error);
+  void examine(Arrival arrival);
+  Result<void> judge(Arrival& arrival) const;
+  void accept(Arrival& arrival, physics_pool::WorldPtr world);
+  void refuse(const Arrival& arrival, const Error& error);
+  void looked_at(const Arrival& arrival);
+  void note_lost_result();
   void feed();
   void finish(const BatchId& batch, const physics_pool::RolloutOutcome& outcome, const physics_pool::Shift& shift);
   Held release(const BatchId& batch, std::uint32_t sample);
-  void obey(const jostle_msgs::msg::BatchControl& control);
+  void obey(const jostle_msgs::msg::BatchControl& control, std::uint64_t writer);
   void cancel(const BatchId& batch);
   void beat(std::stop_token stop);
-  void say_losses();
+  void say_troubles();
+  void say_who_is_served(const std::vector<std::uint64_t>& clients);
   void drop_lost_clients(const std::vector<std::uint64_t>& clients);
   jostle_msgs::msg::WorkerHeartbeat heartbeat(const std::vector<std::uint64_t>& clients) const;
 
+  const wire::Participant participant_;
   const std::uint64_t id_;
   const std::string name_;
   const std::string host_;
   const int threads_;
   WorldStore worlds_;
 
-  mutable std::mutex mutex_;          // guards everything down to kicked_
-  std::condition_variable_any wake_;  // wakes the serving thread
-  std::deque<Arrival> arrivals_;
+  mutable std::mutex mutex_;           // guards everything down to kicked_
+  std::condition_variable_any wake_;   // wakes the serving thread
+  std::deque<Arrival> arrivals_;       // not looked at yet
+  std::deque<Arrival> without_world_;  // looked at, and waiting for their worlds
+  std::size_t arrival_bytes_ = 0;      // of both
   Turns turns_;
   std::map<BatchId, Running> running_;
-  std::map<std::uint64_t, std::uint32_t> loads_;  // samples per client: arrived, waiting, running
-  std::deque<BatchId> cancelled_;                 // lately; an assignment may come after its cancellation
-  int dealt_ = 0;                                 // samples with the executor: one per busy thread
+  std::map<std::uint64_t, Account> accounts_;  // by client
+  std::deque<BatchId> cancelled_;              // lately; an assignment may come after its cancellation
+  int dealt_ = 0;                              // samples with the executor: one per busy thread
   std::uint64_t rollouts_ = 0;
   std::uint64_t engine_steps_ = 0;
-  std::uint64_t refused_ = 0;       // assignments that came when too many were unread
-  std::uint64_t lost_results_ = 0;  // results that the middleware did not take
+  std::uint64_t refused_ = 0;  // assignments that came when their client had too much here
   bool kicked_ = false;
 
-  // Only the heart uses these.
-  std::uint64_t said_lost_results_ = 0, said_refused_ = 0;
-  TimePoint next_complaint_;
+  // Noted where it happens, said by the heart: a log may block.
+  common::Trouble lost_results_{"results"};
+  common::Trouble too_many_{"assignments were dropped"};
+  common::Trouble foreign_{"messages were dropped"};
 
   wire::Writer<jostle_msgs::msg::AssignmentResult> result_writer_;
   wire::Writer<jostle_msgs::msg::WorkerHeartbeat> heartbeat_writer_;

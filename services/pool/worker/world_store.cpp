@@ -6,15 +6,16 @@
 #include <functional>
 
 #include "physics_pool/scene/scene.hpp"
+#include "services/wire/limits.hpp"
 
 namespace jostle::pool {
 
 using physics_pool::World;
 using physics_pool::WorldPtr;
 
-namespace {
+namespace limits = wire::limits;
 
-constexpr std::size_t kTexts = 4096;  // a few kilobytes each
+namespace {
 
 Error refused(const Hash& hash, const std::string& why) {
   return {Code::kInvalidArgument, fmt::format("world: {}: {}", to_string(hash), why)};
@@ -30,20 +31,29 @@ Result<WorldPtr> compile(const Hash& hash, const std::string& text) {
 
 }  // namespace
 
-void WorldStore::announce(const Hash& hash, std::string scene) {
-  const Hash actual = hash_of(scene);
+void WorldStore::announce(const Hash& hash, std::string scene, std::uint64_t client) {
+  const bool too_long = scene.size() > limits::kText;
+  const Hash actual = too_long ? Hash{} : hash_of(scene);
   const std::lock_guard lock(mutex_);
-  Entry& entry = entries_[hash];
+  const auto [found, is_new] = entries_.try_emplace(hash);
+  Entry& entry = found->second;
   if (!entry.scene.empty()) return;  // the right text; nothing can be said better
-  const bool logged = entry.refusal.has_value();
-  entry = {.used = ++clock_};
-  if (actual == hash) {
-    entry.scene = std::move(scene);
+  if (!is_new) count(entry, -1);
+  entry = {.client = client, .used = ++clock_};
+  if (too_long) {
+    refuse(entry, refused(hash, fmt::format("its text: got {} bytes, wanted at most {}", scene.size(), limits::kText)));
+  } else if (actual != hash) {
+    refuse(entry, refused(hash, fmt::format("its text has the hash {}", to_string(actual))));
   } else {
-    entry.refusal = refused(hash, fmt::format("its text has the hash {}", to_string(actual)));
-    if (!logged) fmt::print(stderr, "refused: {}\n", entry.refusal->message);
+    entry.scene = std::move(scene);
   }
-  drop_oldest_text();
+  count(entry, 1);
+  make_room();
+}
+
+void WorldStore::refuse(Entry& entry, Error error) {
+  refusals_.note("refused: {}", error.message);
+  entry.refusal = std::move(error);
 }
 
 std::optional<Result<WorldPtr>> WorldStore::find(const Hash& hash) {
@@ -71,8 +81,7 @@ void WorldStore::keep(const Hash& hash, const Result<WorldPtr>& world_result) {
     found->second.world = *world_result;
     drop_oldest_worlds();
   } else {
-    found->second.refusal = world_result.error();
-    fmt::print(stderr, "refused: {}\n", world_result.error().message);
+    refuse(found->second, world_result.error());
   }
 }
 
@@ -89,9 +98,36 @@ void WorldStore::drop_oldest_worlds() {
   }
 }
 
-void WorldStore::drop_oldest_text() {
-  if (entries_.size() <= kTexts) return;
-  entries_.erase(std::ranges::min_element(entries_, {}, [](const auto& e) { return e.second.used; }));
+void WorldStore::count(const Entry& entry, int sign) {
+  Share& share = shares_[entry.client];
+  share.worlds += static_cast<std::size_t>(sign);  // wraps to what was there before
+  share.bytes += static_cast<std::size_t>(sign) * entry.scene.size();
+  text_bytes_ += static_cast<std::size_t>(sign) * entry.scene.size();
+  if (share.worlds == 0) shares_.erase(entry.client);
+}
+
+// One entry came, so one or a few go.
+void WorldStore::make_room() {
+  const auto most_worlds = [](const auto& share) { return share.second.worlds; };
+  const auto most_bytes = [](const auto& share) { return share.second.bytes; };
+  for (auto most = std::ranges::max_element(shares_, {}, most_worlds);
+       most->second.worlds > limits::kWorldsPerClient || entries_.size() > limits::kWorlds;
+       most = std::ranges::max_element(shares_, {}, most_worlds)) {
+    drop_oldest_text_of(most->first);
+  }
+  while (text_bytes_ > limits::kWorldTexts) {
+    drop_oldest_text_of(std::ranges::max_element(shares_, {}, most_bytes)->first);
+  }
+}
+
+void WorldStore::drop_oldest_text_of(std::uint64_t client) {
+  auto oldest = entries_.end();
+  for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
+    if (entry->second.client != client) continue;
+    if (oldest == entries_.end() || entry->second.used < oldest->second.used) oldest = entry;
+  }
+  count(oldest->second, -1);
+  entries_.erase(oldest);
 }
 
 std::vector<Hash> WorldStore::compiled() const {

@@ -39,7 +39,7 @@ Result<Sample> through_echo(Echo& echo, msg::Assignment assignment, int count, T
     auto answer_result = echo.ask(assignment);
     trips.add(start);
     if (!answer_result) return answer_result.error();
-    auto outcome_result = wire::from_wire(*answer_result);
+    auto outcome_result = wire::from_wire(*std::move(answer_result));
     if (!outcome_result) return outcome_result.error();
     answers.push_back(std::move(outcome_result).value());
   }

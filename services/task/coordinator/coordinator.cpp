@@ -4,15 +4,21 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "services/common/process/program.hpp"
+#include "services/common/process/trouble.hpp"
+#include "services/wire/limits.hpp"
 #include "services/world/link/messages.hpp"
 #include "services/world/link/world_client.hpp"
 
 namespace jostle::task {
+
+namespace limits = wire::limits;
+
 namespace {
 
 using std::chrono::steady_clock;
@@ -36,12 +42,24 @@ const char* word(planners::Phase phase) {
   return "";
 }
 
-using Rollouts = std::map<std::string, std::uint64_t>;  // by worker
+// What one worker did.
+struct Share {
+  std::string label;  // as a report shows it
+  std::uint64_t rollouts = 0;
+};
+using Shares = std::map<std::uint64_t, Share>;  // by worker
 
-Rollouts rollouts_of(const physics_pool::PoolStatus& pool) {
-  Rollouts rollouts;
-  for (const physics_pool::WorkerStatus& worker : pool.workers) rollouts[worker.name] += worker.rollouts;
-  return rollouts;
+// Names may be given twice; then host and process tell the workers apart.
+Shares shares_of(const physics_pool::PoolStatus& pool) {
+  std::map<std::string, int> names;
+  for (const physics_pool::WorkerStatus& worker : pool.workers) ++names[worker.name];
+  Shares shares;
+  for (const physics_pool::WorkerStatus& worker : pool.workers) {
+    const bool unique = names[worker.name] == 1;
+    shares[worker.id] = {unique ? worker.name : fmt::format("{} ({}:{})", worker.name, worker.host, worker.pid),
+                         worker.rollouts};
+  }
+  return shares;
 }
 
 std::uint8_t on_the_wire(planners::Ending ending) { return static_cast<std::uint8_t>(ending); }
@@ -57,14 +75,50 @@ static_assert(endings::UNKNOWN == static_cast<int>(Ending::kUnknown) &&
               endings::REFUSED == static_cast<int>(Ending::kRefused));
 
 // What they did meanwhile; without those that did nothing.
-Rollouts since(const Rollouts& before, Rollouts now) {
-  for (auto& [name, count] : now) {
-    const auto found = before.find(name);
-    if (found != before.end()) count -= std::min(count, found->second);
+Shares since(const Shares& before, Shares now) {
+  for (auto& [id, share] : now) {
+    const auto found = before.find(id);
+    if (found != before.end()) share.rollouts -= std::min(share.rollouts, found->second.rollouts);
   }
-  std::erase_if(now, [](const auto& entry) { return entry.second == 0; });
+  std::erase_if(now, [](const auto& entry) { return entry.second.rollouts == 0; });
   return now;
 }
+
+// Which of so many rollouts each of them did, in proportion: workers count what they are given, slices of rollouts too,
+// and also what nobody waited for in the end. Largest remainders go first, so that the sum is right.
+std::map<std::string, std::uint64_t> apportion(const Shares& shares, std::uint64_t rollouts) {
+  std::uint64_t sum = 0, given = 0;
+  for (const auto& [id, share] : shares) sum += share.rollouts;
+  std::map<std::string, std::uint64_t> result;
+  std::vector<std::pair<std::uint64_t, std::string>> remainders;
+  for (const auto& [id, share] : shares) {
+    const std::uint64_t product = rollouts * share.rollouts;
+    result[share.label] += product / sum;
+    given += product / sum;
+    remainders.emplace_back(product % sum, share.label);
+  }
+  std::ranges::sort(remainders, std::greater());
+  for (const auto& [remainder, label] : remainders) {
+    if (given++ >= rollouts) break;
+    ++result[label];
+  }
+  return result;
+}
+
+// Bytes that are parsed have a limit: parsers take hundreds of times as many.
+Result<void> check_sizes(const jostle_msgs::msg::Goal& goal) {
+  const std::pair<const char*, const std::string&> texts[] = {{"goal.execution_scene", goal.execution_scene()},
+                                                              {"goal.planning_scene", goal.planning_scene()},
+                                                              {"goal.parameters", goal.parameters()}};
+  for (const auto& [field, text] : texts) {
+    if (text.size() <= limits::kText) continue;
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: got {} bytes, wanted at most {}", field, text.size(), limits::kText)};
+  }
+  return {};
+}
+
+std::string shown(const std::string& text) { return common::shown(text, limits::kShown); }
 
 // For what a bag of the run cannot do without. The task itself goes on: a robot does not stop because
 // a recording has a gap.
@@ -83,7 +137,7 @@ nlohmann::json rows(const ControlSequence& controls) {
 
 // What the asker puts into result.json and draws; docs/results.md says what each key is. `seen`: as told to the
 // journal, entry i being what outcome.observed[i] was made of.
-std::string report_of(const planners::Outcome& outcome, const Task& task, std::uint64_t seed, const Rollouts& used,
+std::string report_of(const planners::Outcome& outcome, const Task& task, std::uint64_t seed, const Shares& used,
                       const std::vector<jostle_msgs::msg::Observation>& seen) {
   const planners::Plan& plan = outcome.first_plan;
   const bool has_plan = plan.controls.steps() > 0;
@@ -101,7 +155,7 @@ std::string report_of(const planners::Outcome& outcome, const Task& task, std::u
                         {"planning_seconds", outcome.planning_time.count()},
                         {"total_seconds", outcome.total_time.count()},
                         {"rollouts", outcome.rollouts},
-                        {"used_workers", used},
+                        {"used_workers", apportion(used, outcome.rollouts)},
                         {"dropped_objects", outcome.dropped},
                         {"step_duration", task.parameters().planner.step_duration},
                         {"plan_controls", rows(plan.controls)}};
@@ -122,9 +176,10 @@ std::string report_of(const planners::Outcome& outcome, const Task& task, std::u
 
 }  // namespace
 
-Coordinator::Coordinator(const wire::Participant& participant, physics_pool::AsyncPool& pool)
+Coordinator::Coordinator(const wire::Participant& participant, physics_pool::AsyncPool& pool, TroubleBoard& troubles)
     : participant_(participant),
       pool_(pool),
+      troubles_(troubles),
       feedback_writer_(participant, wire::topics::kTaskFeedback),
       result_writer_(participant, wire::topics::kTaskResult),
       run_writer_(participant, wire::topics::kTaskRun),
@@ -158,8 +213,12 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
     feedback_ = {};
     feedback_.goal_id(goal_id_);
     feedback_.phase("preparing");
+    // Parareal gives workers slices of rollouts.
+    feedback_.unit(goal.predictor().starts_with("parareal") ? "slices" : "rollouts");
   }
-  spdlog::info("goal {}: controller {}, predictor {}, seed {}", goal.goal_id(), goal.controller(), goal.predictor(),
+  troubles_.post("");
+  const std::string id = shown(goal.goal_id());
+  spdlog::info("goal {}: controller {}, predictor {}, seed {}", id, shown(goal.controller()), shown(goal.predictor()),
                goal.seed());
   // A stop of the process cancels the task.
   const std::stop_callback forward(stop, [this] {
@@ -168,10 +227,12 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   });
   jostle_msgs::msg::GoalResult result;
   result.goal_id(goal.goal_id());
-  const Rollouts before = rollouts_of(pool_.status());
+  const Shares before = shares_of(pool_.status());
   {
     const std::jthread refuser([this](std::stop_token own) { refuse_goals_meanwhile(own); });
-    auto task_result = Task::prepare(goal, pool_, [](const std::string& why) { spdlog::info("split: {}", why); });
+    auto ok = check_sizes(goal);
+    auto task_result = ok ? Task::prepare(goal, pool_, [](const std::string& why) { spdlog::info("split: {}", why); })
+                          : Result<Task>(ok.error());
     std::vector<jostle_msgs::msg::Observation> seen;
     auto outcome_result =
         task_result ? perform(goal, *task_result, seen, cancelled) : Result<planners::Outcome>(task_result.error());
@@ -180,16 +241,16 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
       result.success(outcome_result->success);
       result.reason(outcome_result->reason);
       result.report(
-          report_of(*outcome_result, *task_result, goal.seed(), since(before, rollouts_of(pool_.status())), seen));
+          report_of(*outcome_result, *task_result, goal.seed(), since(before, shares_of(pool_.status())), seen));
     } else {
       const Error& error = outcome_result.error();
       const bool was_cancelled = error.code == Code::kCancelled;
       result.ending(on_the_wire(was_cancelled ? planners::Ending::kCancelled : planners::Ending::kBroken));
       result.reason(was_cancelled ? "cancelled" : "the system failed");
-      result.error(error.message);
+      result.error(common::shown(error.message, limits::kShownError));
     }
   }
-  spdlog::info("goal {}: {} {}", goal.goal_id(), result.reason(), result.error());
+  spdlog::info("goal {}: {} {}", id, result.reason(), result.error());
   answer(result, stop);
   const std::lock_guard lock(mutex_);
   goal_id_.clear();
@@ -203,7 +264,7 @@ void Coordinator::answer(const jostle_msgs::msg::GoalResult& result, std::stop_t
   while (!result_writer_.write(result)) {
     if (steady_clock::now() < deadline && common::pause_until(steady_clock::now() + kAnswerPause, stop)) continue;
     spdlog::error("goal {}: its result is lost: the middleware did not take it within {} s; it was: {} {}",
-                  result.goal_id(), kAnswerPatience.count(), result.reason(), result.error());
+                  shown(result.goal_id()), kAnswerPatience.count(), result.reason(), result.error());
     return;
   }
 }
@@ -213,7 +274,7 @@ Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task,
   const physics_pool::TaskGeometry& geometry = task.geometry();
   world::RobotClient robot(participant_);
   world::ObjectsClient objects(participant_, robot);
-  const std::string goal_text = fmt::format("goal {}: ", goal.goal_id());
+  const std::string goal_text = fmt::format("goal {}: ", shown(goal.goal_id()));
   tell(run_writer_, describe_run(goal), goal_text + "its beginning");
   const Task::Watch watch{
       .on_event = [&](const planners::ControlEvent& event) { note(event, geometry); },
@@ -241,7 +302,7 @@ void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
     refusal.reason("refused");
     {
       const std::lock_guard lock(mutex_);
-      refusal.error(fmt::format("coordinator: busy with goal {}; cancel it or wait", goal_id_));
+      refusal.error(fmt::format("coordinator: busy with goal {}; cancel it or wait", shown(goal_id_)));
     }
     answer(refusal, stop);
   }
@@ -281,6 +342,7 @@ void Coordinator::publish_feedback(std::stop_token stop) {
     }
     const std::chrono::duration<double> now = std::chrono::system_clock::now().time_since_epoch();
     feedback.header(world::make_header(now.count(), ""));
+    feedback.trouble(troubles_.text());
     for (const physics_pool::WorkerStatus& worker : pool.workers) {
       jostle_msgs::msg::WorkerReport report;
       report.name(worker.name);
@@ -288,6 +350,9 @@ void Coordinator::publish_feedback(std::stop_token stop) {
       report.capacity(worker.capacity);
       report.rollouts(worker.rollouts);
       report.engine_steps(worker.engine_steps);
+      report.id(worker.id);
+      report.host(worker.host);
+      report.pid(worker.pid);
       feedback.workers().push_back(std::move(report));
     }
     (void)feedback_writer_.write(feedback);  // the next one comes in 100 ms

@@ -19,6 +19,25 @@
 
 namespace jostle::task {
 
+/// What keeps a task from making progress, as its parts say it. Threads: any.
+class TroubleBoard {
+ public:
+  /// An empty text: it goes on.
+  void post(const std::string& text) {
+    const std::lock_guard lock(mutex_);
+    text_ = text;
+  }
+
+  std::string text() const {
+    const std::lock_guard lock(mutex_);
+    return text_;
+  }
+
+ private:
+  mutable std::mutex mutex_;  // guards text_
+  std::string text_;
+};
+
 /// The coordinator performs one task at a time. A goal that arrives meanwhile is refused at once; a
 /// cancelled task ends within a fraction of a second, the robot standing still.
 ///
@@ -27,7 +46,8 @@ namespace jostle::task {
 /// TaskRun, Observation and Plan: enough to make every decision again.
 class Coordinator {
  public:
-  Coordinator(const wire::Participant& participant, physics_pool::AsyncPool& pool);
+  /// `troubles` is shown in the feedback as long as a task is there.
+  Coordinator(const wire::Participant& participant, physics_pool::AsyncPool& pool, TroubleBoard& troubles);
 
   /// Runs until a stop is requested.
   void run(std::stop_token stop);
@@ -47,6 +67,7 @@ class Coordinator {
 
   const wire::Participant participant_;
   physics_pool::AsyncPool& pool_;
+  TroubleBoard& troubles_;
 
   std::mutex mutex_;  // guards feedback_, started_, goal_id_ and cancel_
   jostle_msgs::msg::Feedback feedback_;

@@ -38,13 +38,18 @@ int main(int argc, char** argv) {
   }
   spdlog::info("{}, domain {}", common::participant_name(participant_result->id()), participant_result->domain());
   try {
+    TroubleBoard troubles;
+    const auto on_trouble = [&](const std::string& text) {
+      if (!text.empty()) spdlog::warn("{}", text);
+      troubles.post(text);
+    };
     std::unique_ptr<physics_pool::AsyncPool> pool;
     if (pool_kind == "dds") {
-      pool = std::make_unique<pool::RemotePool>(*participant_result);
+      pool = std::make_unique<pool::RemotePool>(*participant_result, pool::RemotePoolOptions{.on_trouble = on_trouble});
     } else {
       pool = std::make_unique<physics_pool::ThreadPool>(threads);
     }
-    Coordinator(*participant_result, *pool).run(signal.token());
+    Coordinator(*participant_result, *pool, troubles).run(signal.token());
     return common::kExitOk;
   } catch (const wire::SetupError& error) {
     spdlog::error("{}", error.what());

@@ -24,15 +24,15 @@ std::string Display::text(const jostle_msgs::msg::Feedback& feedback) {
   double total = 0.0;
   for (const auto& report : feedback.workers()) {
     if (!report.alive()) continue;
-    const double rate = rates_[report.name()].per_second;
+    const double rate = rates_[report.id()].per_second;
     total += rate;
     workers += fmt::format(" {}:{:.1f}", report.name(), rate);
   }
   return fmt::format(
       "{:5.1f} s  {:<9} iteration {:>2}  cost {:>8.1f}  target {:>5.1f} cm  actions {:>2}  "
-      "re-plans {:>2}  {:.1f} rollouts/s [{} ]",
+      "re-plans {:>2}  {:.1f} {}/s [{} ]",
       feedback.elapsed(), feedback.phase(), feedback.iteration(), feedback.cost(), 100 * feedback.target_distance(),
-      feedback.actions(), feedback.replans(), total, workers);
+      feedback.actions(), feedback.replans(), total, feedback.unit(), workers);
 }
 
 void Display::measure_rates(const jostle_msgs::msg::Feedback& feedback) {
@@ -41,9 +41,10 @@ void Display::measure_rates(const jostle_msgs::msg::Feedback& feedback) {
   if (now - measured_ < kRateWindow) return;
   measured_ = now;
   for (const auto& report : feedback.workers()) {
-    Rate& rate = rates_[report.name()];
+    Rate& rate = rates_[report.id()];
     // The first window of a worker has no beginning to measure from.
-    rate.per_second = rate.rollouts == 0 ? 0.0 : static_cast<double>(report.rollouts() - rate.rollouts) / elapsed;
+    const bool measured = rate.rollouts > 0 && report.rollouts() >= rate.rollouts;
+    rate.per_second = measured ? static_cast<double>(report.rollouts() - rate.rollouts) / elapsed : 0.0;
     rate.rollouts = report.rollouts();
   }
 }

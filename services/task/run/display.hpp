@@ -30,7 +30,7 @@ class Display {
 
   common::LiveLine& line_;
   std::chrono::steady_clock::time_point measured_;
-  std::map<std::string, Rate> rates_;  // by worker
+  std::map<std::uint64_t, Rate> rates_;  // by worker
   std::string last_news_;
 };
 

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace jostle::task {
 
-GoalClient::GoalClient(const wire::Participant& participant, std::string goal_id, OnFeedback on_feedback)
+GoalClient::GoalClient(const wire::Participant& participant, std::string goal_id, Listener listener)
     : goal_id_(std::move(goal_id)),
-      on_feedback_(std::move(on_feedback)),
+      listener_(std::move(listener)),
       goal_(participant, wire::topics::kTaskGoal),
       cancel_(participant, wire::topics::kTaskCancel),
       feedback_(participant, wire::topics::kTaskFeedback, 64),
@@ -15,11 +16,15 @@ GoalClient::GoalClient(const wire::Participant& participant, std::string goal_id
       results_(participant, wire::topics::kTaskResult, 8) {}
 
 void GoalClient::listen() {
-  for (const auto& feedback : feedback_.take_all()) {
+  for (const auto& [feedback, writer] : feedback_.take_letters()) {
+    if (sent_ && writer != coordinator_) continue;
     coordinator_heard_ = Clock::now();
     // Ours is idle until it gets our goal; it may be the last one we hear of.
     if (!sent_ && !feedback.goal_id().empty()) others_heard_ = true;
-    if (sent_ && feedback.goal_id() == goal_id_ && on_feedback_) on_feedback_(feedback);
+    if (!sent_ || feedback.goal_id() != goal_id_) continue;
+    if (listener_.on_feedback) listener_.on_feedback(feedback);
+    if (std::exchange(trouble_, feedback.trouble()) == feedback.trouble() || trouble_.empty()) continue;
+    if (listener_.on_notice) listener_.on_notice(trouble_);
   }
   if (!world_.take_all().empty()) world_heard_ = Clock::now();
 }
@@ -35,16 +40,17 @@ bool GoalClient::reaches(std::uint64_t coordinator) const {
   return feedback_.last_writer() == coordinator && results_.hears(coordinator);
 }
 
-bool GoalClient::send(jostle_msgs::msg::Goal goal) {
+bool GoalClient::send(jostle_msgs::msg::Goal goal, std::uint64_t coordinator) {
   goal.goal_id(goal_id_);
+  coordinator_ = coordinator;
   sent_ = goal_.write(goal);
   return sent_;
 }
 
 std::optional<jostle_msgs::msg::GoalResult> GoalClient::wait(Clock::time_point deadline, std::stop_token stop) {
-  auto result = results_.take(deadline, std::move(stop));
-  if (result && result->goal_id() == goal_id_) return result;
-  return {};
+  auto letter = results_.take_letter(deadline, std::move(stop));
+  if (!letter || letter->sample.goal_id() != goal_id_ || letter->writer != coordinator_) return {};
+  return std::move(letter->sample);
 }
 
 void GoalClient::cancel() {

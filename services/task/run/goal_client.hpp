@@ -16,16 +16,19 @@
 
 namespace jostle::task {
 
-/// A GoalClient asks the coordinator of a domain to perform one goal.
+/// A GoalClient asks the coordinator of a domain to perform one goal. Once it has been asked, nobody else is believed.
 ///
 /// Threads  one.
 class GoalClient {
  public:
   using Clock = std::chrono::steady_clock;
-  using OnFeedback = std::function<void(const jostle_msgs::msg::Feedback&)>;
+  struct Listener {
+    std::function<void(const jostle_msgs::msg::Feedback&)> on_feedback;  ///< of this goal; may be empty
+    std::function<void(const std::string&)> on_notice;                   ///< the coordinator's trouble; may be empty
+  };
 
-  /// `goal_id`: unique among all goals of the domain. `on_feedback`: hears of this goal alone; may be empty.
-  GoalClient(const wire::Participant& participant, std::string goal_id, OnFeedback on_feedback);
+  /// `goal_id`: unique among all goals of the domain.
+  GoalClient(const wire::Participant& participant, std::string goal_id, Listener listener);
 
   const std::string& goal_id() const { return goal_id_; }
 
@@ -43,8 +46,9 @@ class GoalClient {
   /// Whether a goal would reach the coordinator of this participant, and its result us.
   bool reaches(std::uint64_t coordinator) const;
 
-  /// Sends the goal, whose id becomes goal_id(). Returns whether the middleware took it.
-  bool send(jostle_msgs::msg::Goal goal);
+  /// Sends the goal, whose id becomes goal_id(), to be performed by this participant. Returns whether the middleware
+  /// took it.
+  bool send(jostle_msgs::msg::Goal goal, std::uint64_t coordinator);
   bool is_sent() const { return sent_; }
 
   /// Waits for the result of this goal; nothing if `deadline` or a stop comes first.
@@ -55,8 +59,10 @@ class GoalClient {
 
  private:
   const std::string goal_id_;
-  const OnFeedback on_feedback_;
+  const Listener listener_;
   bool sent_ = false;
+  std::uint64_t coordinator_ = 0;  // its participant, once the goal was sent
+  std::string trouble_;            // the coordinator's newest
   bool others_heard_ = false;
   std::optional<Clock::time_point> coordinator_heard_, world_heard_;
 

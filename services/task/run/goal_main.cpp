@@ -32,7 +32,7 @@ Result<void> send(GoalClient& client, const RunOptions& options, int domain, dou
     client.listen();
     const std::vector<std::uint64_t> found = client.coordinators();
     const bool answers = found.size() == 1 && client.reaches(found.front());
-    if (answers && client.world_heard() && client.send(make_goal(options))) return {};
+    if (answers && client.world_heard() && client.send(make_goal(options), found.front())) return {};
     if (!common::pause_until(Clock::now() + kTick, stop)) return Error{Code::kCancelled, "interrupted"};
     if (Clock::now() < deadline) continue;
     if (found.size() > 1) {
@@ -76,7 +76,8 @@ int perform(const RunOptions& options, double patience, std::stop_token stop) {
   common::LiveLine line("jostle goal", options.headless ? common::PlainLines::kAlways : common::PlainLines::kElsewhere);
   Display display(line);
   GoalClient client(*participant_result, fmt::format("goal-{:016x}", participant_result->id()),
-                    [&](const auto& feedback) { display.show(feedback); });
+                    {.on_feedback = [&](const auto& feedback) { display.show(feedback); },
+                     .on_notice = [&](const std::string& text) { line.say("{}", text); }});
   const auto code_of = [](const Error& error) {
     return error.code == Code::kCancelled ? common::kExitInterrupted : common::kExitBroken;
   };

@@ -35,9 +35,10 @@ int perform(const RunOptions& options, std::stop_token stop) {
     return fail(result.error(),
                 result.error().code == Code::kCancelled ? common::kExitInterrupted : common::kExitBroken);
   if (!result->error().empty()) return fail({Code::kUnavailable, result->error()}, common::kExitBroken);
-  (*session_result)->finish_recording();
+  const auto recorded = (*session_result)->finish_recording();
   session_result->reset();  // before drawing: every process it started is gone
   if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), common::kExitBroken);
+  if (!recorded) return fail(recorded.error(), common::kExitBroken);
   return result->success() ? common::kExitOk : common::kExitFailed;
 }
 

@@ -37,8 +37,8 @@ void add_goal_options(CLI::App& app, GoalArguments& arguments, RunOptions& optio
   common::add_network_options(app);
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
   app.footer(
-      "Exit codes: 0 grasped or pushed to its goal, 1 not, 2 bad input, 3 a part of the system failed, 130 "
-      "interrupted.");
+      "Exit codes: 0 grasped or pushed to its goal, 1 not, 2 bad input, 3 a part of the system failed or the\n"
+      "recording is not complete, 130 interrupted.");
 }
 
 Result<void> complete(const GoalArguments& arguments, RunOptions& options) {

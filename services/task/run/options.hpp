@@ -27,7 +27,7 @@ struct RunOptions {
   physics_pool::Uncertainty level = physics_pool::Uncertainty::kNone;
   std::string controller;          ///< a name of planners/controllers/catalogue.hpp
   std::string predictor = "fine";  ///< see services/task/config/predictor.hpp
-  std::string pool = "dds";  ///< dds or threads; empty: that of a coordinator which runs already
+  std::string pool = "dds";        ///< dds or threads; empty: that of a coordinator which runs already
   int workers = 2;
   std::vector<int> cores;  ///< dealt to the workers in turn; empty: not pinned
   std::uint64_t seed = 1;

@@ -1,9 +1,12 @@
 #include "services/task/run/session.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
@@ -11,7 +14,8 @@
 namespace jostle::task {
 namespace {
 
-constexpr std::chrono::milliseconds kSilence{1500};  // of a process that speaks ten times a second
+constexpr std::chrono::milliseconds kSilence{1500};  // of a process that speaks ten times a second: worth a word
+constexpr std::chrono::seconds kLongSilence{10};     // it does not come back
 constexpr std::chrono::seconds kStart{15};           // for processes to start and find each other
 constexpr std::chrono::milliseconds kTick{50};
 constexpr std::chrono::seconds kCancelPatience{2};
@@ -46,7 +50,9 @@ Session::Session(const RunOptions& options, Watcher watcher, wire::Participant p
       participant_(std::move(participant)),
       claim_(std::move(claim)),
       folder_(std::move(folder)),
-      client_(participant_, folder_.filename().string(), watcher_.on_feedback) {}
+      client_(participant_, folder_.filename().string(),
+              {.on_feedback = watcher_.on_feedback, .on_notice = watcher_.on_notice}),
+      witness_(participant_, !options.record.empty()) {}
 
 Session::~Session() {
   // All at once, then one after the other: shutting down takes as long as the slowest.
@@ -57,7 +63,7 @@ Session::~Session() {
   workers_.clear();
   world_process_.reset();
   coordinator_process_.reset();
-  finish_recording();
+  (void)finish_recording();  // a run that failed has said worse
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
 }
@@ -68,7 +74,7 @@ Result<void> Session::start_recorder() {
   auto process_result = common::ChildProcess::start(
       program("record"),
       {"--output", options_.record.string(), "--until-result", "--domain", std::to_string(participant_.domain()),
-       "--die-with-parent", std::to_string(getpid())},
+       "--die-with-parent", std::to_string(getpid()), "--json", (folder_ / "record.json").string()},
       folder_ / "record.log");
   if (!process_result) return process_result.error();
   recorder_process_ = std::move(process_result).value();
@@ -86,21 +92,47 @@ Result<void> Session::start_recorder() {
   return {};
 }
 
-void Session::finish_recording() {
-  if (!recorder_process_) return;
+Result<void> Session::finish_recording() {
+  if (!recorder_process_) return {};
   if (!recorder_process_->wait_for(kLastWords)) recorder_process_->terminate();
   recorder_process_->wait_for(kStart);
+  auto ok = check_recording();
   look_after_recorder();
+  return ok;
+}
+
+// What we heard ourselves must be in the bag: a recorder that did not run for a while does not know what it missed.
+Result<void> Session::check_recording() const {
+  const auto text_result = common::read_text(folder_ / "record.json");
+  const auto report = nlohmann::json::parse(text_result ? *text_result : "", nullptr, false);
+  std::vector<std::string> gaps;
+  if (report.is_discarded()) gaps.emplace_back("its recorder did not end in an orderly way");
+  for (const auto& [topic, heard] : witness_.counts()) {
+    if (report.is_discarded()) break;
+    const std::uint64_t recorded = report["messages"].value(topic, std::uint64_t{0});
+    const std::uint64_t lost = report["lost"].value(topic, std::uint64_t{0});
+    if (recorded < heard) gaps.push_back(fmt::format("{} of {} messages of {}", heard - recorded, heard, topic));
+    if (recorded >= heard && lost > 0) gaps.push_back(fmt::format("{} messages of {}", lost, topic));
+  }
+  if (gaps.empty()) return {};
+  return Error{Code::kIo,
+               fmt::format("the recording {} is not complete: {} {} missing, for the recorder did not run or was cut "
+                           "off for a while; it cannot be replayed as a whole",
+                           options_.record.string(), fmt::join(gaps, ", "), gaps.size() == 1 ? "is" : "are")};
+}
+
+void Session::notice(const std::string& text) const {
+  if (watcher_.on_notice) watcher_.on_notice(text);
 }
 
 void Session::look_after_recorder() {
   if (!recorder_process_) return;
   const auto ended = recorder_process_->ended();
-  if (!ended) return;
-  if (!ended->ok() && watcher_.on_notice) {
-    watcher_.on_notice(fmt::format("the recorder ended: {}\n{}", ended->text(), recorder_process_->last_words()));
+  if (!ended || recorder_missed_) return;
+  recorder_missed_ = true;
+  if (!ended->ok()) {
+    notice(fmt::format("the recorder ended: {}\n{}", ended->text(), recorder_process_->last_words()));
   }
-  recorder_process_.reset();
 }
 
 Result<void> Session::start_processes() {
@@ -139,9 +171,9 @@ Result<void> Session::start_processes() {
 }
 
 Result<common::ChildProcess> Session::start_worker(std::size_t place) {
-  const std::string name = fmt::format("worker-{}", workers_started_++);
-  std::vector<std::string> arguments{
-      "--name", name, "--domain", std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())};
+  const std::string name = fmt::format("worker-{}", workers_started_++);  // of its log; it calls itself by host and pid
+  std::vector<std::string> arguments{"--domain", std::to_string(participant_.domain()), "--die-with-parent",
+                                     std::to_string(getpid())};
   if (const auto& cores = options_.cores; !cores.empty()) {
     arguments.insert(arguments.end(), {"--pin", std::to_string(cores[place % cores.size()])});
   }
@@ -191,7 +223,8 @@ Result<void> Session::send_goal() {
                              answers ? "the simulated world was" : "the coordinator was", kStart.count(),
                              participant_.domain())};
   }
-  if (client_.send(make_goal(options_)) || Clock::now() < goal_deadline_) return {};  // tried again at the next tick
+  if (client_.send(make_goal(options_), found.front()) || Clock::now() < goal_deadline_)
+    return {};  // else the next tick
   return Error{Code::kUnavailable,
                fmt::format("the goal could not be sent within {} s: the middleware did not take it; profiles that "
                            "limit {} may be the reason",
@@ -202,11 +235,14 @@ Result<void> Session::look_after() {
   look_after_recorder();
   if (auto ok = check_alive("the simulated world", *world_process_); !ok) return ok;
   if (auto ok = check_alive("the coordinator", *coordinator_process_); !ok) return ok;
-  if (const auto heard = client_.world_heard()) {
-    if (auto ok = check_heard("the simulated world", *heard); !ok) return ok;
-  }
-  if (const auto heard = client_.coordinator_heard()) {
-    if (auto ok = check_heard("the coordinator", *heard); !ok) return ok;
+  look_for(world_part_, client_.world_heard());
+  look_for(coordinator_, client_.coordinator_heard());
+  if (const auto heard = client_.coordinator_heard(); heard && Clock::now() - *heard >= kLongSilence) {
+    return Error{
+        Code::kUnavailable,
+        fmt::format("the coordinator runs but was not heard for {} s: stalled or cut off; `jostle doctor` checks "
+                    "the network, and fewer --workers leave it more of a busy machine",
+                    kLongSilence.count())};
   }
   for (common::ChildProcess& worker : workers_) {
     const auto ended = worker.ended();
@@ -235,11 +271,38 @@ Result<void> Session::check_alive(const std::string& name, common::ChildProcess&
   return Error{Code::kUnavailable, fmt::format("{} ended: {}\n{}", name, ended->text(), child.last_words())};
 }
 
-Result<void> Session::check_heard(const std::string& name, Clock::time_point heard) const {
-  const auto silence = Clock::now() - heard;
-  if (silence < kSilence) return {};
-  return Error{Code::kUnavailable, fmt::format("{} runs but was not heard for {:.1f} s: stalled or cut off", name,
-                                               std::chrono::duration<double>(silence).count())};
+void Session::look_for(Part& part, std::optional<Clock::time_point> heard) {
+  if (!heard) return;
+  const std::chrono::duration<double> silence = Clock::now() - *heard;
+  const bool missed = silence >= kSilence;
+  if (missed == std::exchange(part.missed, missed)) return;
+  notice(missed ? fmt::format(
+                      "{} runs but was not heard for {:.1f} s; the machine may be busy, or it is stalled or cut off",
+                      part.name, silence.count())
+                : fmt::format("{} is heard again", part.name));
+}
+
+Witness::Witness(const wire::Participant& participant, bool listens) {
+  if (!listens) return;
+  follow(runs_, participant, wire::topics::kTaskRun);
+  follow(observations_, participant, wire::topics::kTaskObservation);
+  follow(plans_, participant, wire::topics::kTaskPlan);
+  follow(results_, participant, wire::topics::kTaskResult);
+}
+
+template <class T>
+void Witness::follow(std::optional<wire::Reader<T>>& reader, const wire::Participant& participant,
+                     const wire::Topic<T>& topic) {
+  const std::string name = *wire::ros_topic(participant.wire_name(topic.name, topic.scope));
+  reader.emplace(participant, topic, [this, name](const T&) {
+    const std::lock_guard lock(mutex_);
+    ++counts_[name];
+  });
+}
+
+std::map<std::string, std::uint64_t> Witness::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
 }
 
 }  // namespace jostle::task

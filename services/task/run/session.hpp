@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -16,14 +17,38 @@
 #include "services/task/run/goal_client.hpp"
 #include "services/task/run/options.hpp"
 #include "services/wire/dds/participant.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
 
 namespace jostle::task {
+
+/// Counts what a bag of the run must have, by ROS 2's name of the topic. Threads: any.
+class Witness {
+ public:
+  /// Listens only where `listens`.
+  Witness(const wire::Participant& participant, bool listens);
+  std::map<std::string, std::uint64_t> counts() const;
+
+ private:
+  template <class T>
+  void follow(std::optional<wire::Reader<T>>& reader, const wire::Participant& participant,
+              const wire::Topic<T>& topic);
+
+  mutable std::mutex mutex_;  // guards counts_
+  std::map<std::string, std::uint64_t> counts_;
+  std::optional<wire::Reader<jostle_msgs::msg::TaskRun>> runs_;
+  std::optional<wire::Reader<jostle_msgs::msg::Observation>> observations_;
+  std::optional<wire::Reader<jostle_msgs::msg::Plan>> plans_;
+  std::optional<wire::Reader<jostle_msgs::msg::GoalResult>> results_;
+};
 
 /// Starts workers, simulated world and coordinator, and looks after them:
 ///
 ///   a worker that ends is replaced; its work goes to the others meanwhile
-///   a world or coordinator that ends, or is silent for kSilence, ends the run
-///   with an error that says which, how, and what it printed last
+///   a world or coordinator that ends, ends the run with an error that says which, how, and
+///   what it printed last
+///   one that is silent is news: it may be slow. The coordinator's silence ends the run when it lasts,
+///   for its result is waited for; the world's when the coordinator waits for it
 ///   a recorder that ends early is news, and the run goes on
 ///
 /// Destroying it ends every process it started and removes its files.
@@ -45,8 +70,9 @@ class Session {
   ///          kUnavailable  a part of the system is gone; the message says which
   Result<jostle_msgs::msg::GoalResult> perform(std::stop_token stop);
 
-  /// Waits until the bag, if one was asked for, has the result and is complete.
-  void finish_recording();
+  /// Waits until the bag, if one was asked for, has the result and is complete. Error kIo: it is not; says what is
+  /// missing. For after perform().
+  Result<void> finish_recording();
 
  private:
   using Clock = GoalClient::Clock;
@@ -59,8 +85,17 @@ class Session {
   Result<common::ChildProcess> start_worker(std::size_t place);  // index among the workers
   Result<void> look_after();
   void look_after_recorder();
+  Result<void> check_recording() const;
   Result<void> check_alive(const std::string& name, common::ChildProcess& child) const;
-  Result<void> check_heard(const std::string& name, Clock::time_point heard) const;
+  // Another part of the run, and whether it is missed.
+  struct Part {
+    std::string name;
+    bool missed = false;  // and said so
+  };
+
+  // Says when a part, heard last at `heard`, falls silent, and when it is heard again.
+  void look_for(Part& part, std::optional<Clock::time_point> heard);
+  void notice(const std::string& text) const;
   Result<void> send_goal();
 
   const RunOptions& options_;
@@ -70,10 +105,13 @@ class Session {
   std::filesystem::path folder_;  // for logs and the scene; removed at the end
   int workers_started_ = 0;
   Clock::time_point goal_deadline_;
+  Part coordinator_{"the coordinator"}, world_part_{"the simulated world"};
   GoalClient client_;
+  Witness witness_;
 
   std::vector<common::ChildProcess> workers_;
   std::vector<Clock::time_point> restarts_;
+  bool recorder_missed_ = false;  // it ended, and that was said
   std::optional<common::ChildProcess> world_process_, coordinator_process_, recorder_process_;
 };
 

@@ -31,6 +31,7 @@ constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string
     {"sim", "simulate the world in which actions happen"},
     {"train-coarse", "train the learned coarse model of pushing"},
     {"worker", "simulate rollouts for whoever asks"},
+    {"workers", "list the workers of a domain, and whom they serve"},
 });
 
 // Levenshtein's distance, one row at a time.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 namespace jostle::wire {
 namespace {
@@ -26,10 +27,11 @@ std::vector<msg::Term> to_wire(const std::vector<physics_pool::Term>& terms) {
   return wire;
 }
 
-std::vector<physics_pool::Term> from_wire(const std::vector<msg::Term>& wire) {
+std::vector<physics_pool::Term> from_wire(std::vector<msg::Term>&& wire) {
   std::vector<physics_pool::Term> terms;
-  for (const msg::Term& term : wire)
-    terms.push_back({.kind = term.kind(), .weight = term.weight(), .values = term.values()});
+  terms.reserve(wire.size());
+  for (msg::Term& term : wire)
+    terms.push_back({.kind = std::move(term.kind()), .weight = term.weight(), .values = std::move(term.values())});
   return terms;
 }
 
@@ -99,20 +101,20 @@ msg::BatchDescription to_wire(const RolloutBatch& batch) {
   return wire;
 }
 
-RolloutBatch from_wire(const msg::BatchDescription& wire) {
-  RolloutBatch batch{.objective = {.terms = from_wire(wire.terms()), .success_cost = wire.success_cost()}};
+RolloutBatch from_wire(msg::BatchDescription wire) {
+  RolloutBatch batch{.objective = {.terms = from_wire(std::move(wire.terms())), .success_cost = wire.success_cost()}};
   batch.world = from_wire(wire.world());
-  batch.x0 = {.q = wire.q(), .v = wire.v()};
-  batch.nominal = {.nu = wire.nu(), .values = wire.nominal()};
-  batch.u_before = wire.u_before();
+  batch.x0 = {.q = std::move(wire.q()), .v = std::move(wire.v())};
+  batch.nominal = {.nu = wire.nu(), .values = std::move(wire.nominal())};
+  batch.u_before = std::move(wire.u_before());
   batch.step_duration = wire.step_duration();
-  batch.law = {.sigma = wire.sigma(),
-               .limit = wire.limit(),
-               .scales = wire.scales(),
+  batch.law = {.sigma = std::move(wire.sigma()),
+               .limit = std::move(wire.limit()),
+               .scales = std::move(wire.scales()),
                .seed = wire.seed(),
                .stream = wire.stream(),
                .persistence = wire.persistence(),
-               .draws = wire.draws()};
+               .draws = std::move(wire.draws())};
   batch.first_sample = wire.first_sample();
   batch.samples = wire.samples();
   batch.noise = {.sigma = wire.noise().sigma(), .slope = wire.noise().slope(), .seed = wire.noise().seed()};
@@ -153,7 +155,7 @@ msg::AssignmentResult to_wire(const RolloutOutcome& outcome) {
   return wire;
 }
 
-Result<RolloutOutcome> from_wire(const msg::AssignmentResult& wire) {
+Result<RolloutOutcome> from_wire(msg::AssignmentResult wire) {
   if (!wire.error().empty()) {
     const bool known = wire.error_code() <= static_cast<std::uint8_t>(Code::kInternal);
     return Error{known ? static_cast<Code>(wire.error_code()) : Code::kInternal, wire.error()};
@@ -180,10 +182,10 @@ Result<RolloutOutcome> from_wire(const msg::AssignmentResult& wire) {
                         .engine_steps = wire.engine_steps(),
                         .thawed = wire.thawed(),
                         .at_goal = wire.at_goal(),
-                        .step_costs = wire.step_costs(),
+                        .step_costs = std::move(wire.step_costs()),
                         .facts = std::move(facts),
                         .trajectory = std::move(trajectory_result).value(),
-                        .reason = wire.reason()};
+                        .reason = std::move(wire.reason())};
 }
 
 }  // namespace jostle::wire

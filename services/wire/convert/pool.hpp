@@ -15,13 +15,13 @@ jostle_msgs::msg::BatchDescription to_wire(const physics_pool::RolloutBatch& bat
 
 /// Never fails: whatever the wire holds becomes a batch, to be judged by
 /// physics_pool::validate.
-physics_pool::RolloutBatch from_wire(const jostle_msgs::msg::BatchDescription& wire);
+physics_pool::RolloutBatch from_wire(jostle_msgs::msg::BatchDescription wire);
 
 /// Converts the outcome only; the sender fills in who asked and who answers.
 jostle_msgs::msg::AssignmentResult to_wire(const physics_pool::RolloutOutcome& outcome);
 
 /// Errors   the worker's own, if it refused the assignment
 ///          kInvalidArgument  `end`, `cost`, `step_costs` or `trajectory` make no sense
-Result<physics_pool::RolloutOutcome> from_wire(const jostle_msgs::msg::AssignmentResult& wire);
+Result<physics_pool::RolloutOutcome> from_wire(jostle_msgs::msg::AssignmentResult wire);
 
 }  // namespace jostle::wire

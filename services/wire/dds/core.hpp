@@ -28,6 +28,8 @@ std::uint64_t participant_id(const eprosima::fastrtps::rtps::GUID_t& guid);
 
 Guid to_guid(const eprosima::fastrtps::rtps::GUID_t& guid);
 
+class Directory;
+
 class Participant::Core {
  public:
   /// Owns the participant.
@@ -44,6 +46,7 @@ class Participant::Core {
   eprosima::fastdds::dds::DomainParticipant* const participant;
   eprosima::fastdds::dds::Publisher* const publisher;
   eprosima::fastdds::dds::Subscriber* const subscriber;
+  const std::shared_ptr<const Directory> directory;
   const int domain;
   const std::string space;  // namespace
 

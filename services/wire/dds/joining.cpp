@@ -18,8 +18,8 @@ using eprosima::fastdds::dds::DomainParticipantFactory;
 using eprosima::fastdds::dds::DomainParticipantQos;
 using Listener = eprosima::fastdds::dds::DomainParticipantListener;
 
-// Knows who came with an identity, and who of them was let in or turned away. Endpoints are the
-// watch's.
+// Keeps the directory, and knows who came with an identity, and who of them was let in or turned away. Endpoints are
+// the watch's.
 class Doorkeeper final : public Listener {
  public:
   explicit Doorkeeper(std::shared_ptr<EndpointWatch> watch) : watch_(std::move(watch)) {}
@@ -27,6 +27,7 @@ class Doorkeeper final : public Listener {
   void on_participant_discovery(DomainParticipant*, ParticipantDiscoveryInfo&& info) override {
     const bool gone = info.status == ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
                       info.status == ParticipantDiscoveryInfo::DROPPED_PARTICIPANT;
+    gone ? directory_->remove(info.info.m_guid) : directory_->add(info.info);
     const std::lock_guard lock(mutex_);
     if (gone) {
       came_.erase(info.info.m_guid);
@@ -51,6 +52,8 @@ class Doorkeeper final : public Listener {
     if (watch_) watch_->listener().on_subscriber_discovery(self, std::move(info));
   }
 
+  const std::shared_ptr<Directory>& directory() const { return directory_; }
+
   // Whether it knows by then what to think of everybody who came.
   bool knows_all_by(std::chrono::steady_clock::time_point deadline) {
     std::unique_lock lock(mutex_);
@@ -62,6 +65,7 @@ class Doorkeeper final : public Listener {
 
  private:
   const std::shared_ptr<EndpointWatch> watch_;
+  const std::shared_ptr<Directory> directory_ = std::make_shared<Directory>();
   std::mutex mutex_;  // guards the sets
   std::condition_variable changed_;
   std::set<GUID_t> came_, judged_;
@@ -80,8 +84,8 @@ DomainParticipant* create(int domain, const DomainParticipantQos& qos, Listener*
 
 Joined join(int domain, const DomainParticipantQos& qos, const std::shared_ptr<EndpointWatch>& watch) {
   if (!is_protected(qos)) {
-    const std::shared_ptr<Listener> listener(watch, watch ? &watch->listener() : nullptr);
-    return {listener, create(domain, qos, listener.get())};
+    const auto door = std::make_shared<Doorkeeper>(watch);
+    return {door, door->directory(), create(domain, qos, door.get())};
   }
   for (bool is_first = true;; is_first = false) {
     const auto door = std::make_shared<Doorkeeper>(watch);
@@ -93,7 +97,7 @@ Joined join(int domain, const DomainParticipantQos& qos, const std::shared_ptr<E
     const bool stays = !is_first || door->knows_all_by(start + kHail + kPatience);
     if (!stays) DomainParticipantFactory::get_instance()->delete_participant(participant);
     if (watch) watch->let_go(stays);
-    if (stays) return {door, participant};
+    if (stays) return {door, door->directory(), participant};
   }
 }
 

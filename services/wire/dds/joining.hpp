@@ -6,14 +6,16 @@
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <memory>
 
+#include "services/wire/dds/directory.hpp"
 #include "services/wire/dds/endpoint_watch.hpp"
 
 namespace jostle::wire {
 
-/// A participant, with the listener that must outlive it.
+/// A participant, with the listener that must outlive it, and what it hears.
 struct Joined {
-  std::shared_ptr<eprosima::fastdds::dds::DomainParticipantListener> listener;  ///< may be empty
-  eprosima::fastdds::dds::DomainParticipant* participant = nullptr;             ///< null: the middleware refused
+  std::shared_ptr<eprosima::fastdds::dds::DomainParticipantListener> listener;
+  std::shared_ptr<const Directory> directory;
+  eprosima::fastdds::dds::DomainParticipant* participant = nullptr;  ///< null: the middleware refused
 };
 
 /// Creates a participant that `watch` (may be empty) hears from. A protected one has

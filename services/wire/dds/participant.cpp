@@ -20,7 +20,9 @@
 #include "idl/types/hash.hpp"
 #include "services/common/process/domain.hpp"
 #include "services/wire/dds/core.hpp"
+#include "services/wire/dds/directory.hpp"
 #include "services/wire/dds/endpoint_watch.hpp"
+#include "services/wire/dds/guard.hpp"
 #include "services/wire/dds/profiles.hpp"
 #include "services/wire/dds/security.hpp"
 
@@ -155,6 +157,15 @@ const char* middleware_version() { return FASTRTPS_VERSION_STR; }
 
 std::vector<std::string> Participant::others() const { return core_->participant->get_participant_names(); }
 
+std::optional<ParticipantInfo> Participant::find(std::uint64_t id) const { return core_->directory->find(id); }
+
+std::string ParticipantInfo::text() const {
+  std::string text = name.empty() ? "a participant without a name" : name;
+  if (!host.empty()) text += " on " + host;
+  if (pid > 0) text += fmt::format(", process {}", pid);
+  return text;
+}
+
 std::optional<DomainParticipantQos> built_in_participant(const std::string& profile) {
   if (profile != "udp" && profile != "shared_memory") return {};
   DomainParticipantQos qos;
@@ -235,6 +246,8 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
     }
     if (auto ok = secure(qos, identity); !ok) return ok.error();
   }
+  introduce(qos);
+  guard(qos);
   Joined joined = join(*domain_result, qos, options.watch);
   if (!joined.participant) {
     return Error{Code::kUnavailable, fmt::format("DDS domain {}: no participant could be created; check the network "
@@ -266,6 +279,7 @@ Participant::Core::Core(Joined joined, int domain_id, std::string name_space)
     : participant(joined.participant),
       publisher(participant->create_publisher(eprosima::fastdds::dds::PUBLISHER_QOS_DEFAULT)),
       subscriber(participant->create_subscriber(eprosima::fastdds::dds::SUBSCRIBER_QOS_DEFAULT)),
+      directory(std::move(joined.directory)),
       domain(domain_id),
       space(std::move(name_space)),
       listener_(std::move(joined.listener)) {}

@@ -33,6 +33,16 @@ struct ParticipantOptions {
   std::optional<std::string> identity;   ///< its folder; "": unprotected; not given: JOSTLE_SECURE
 };
 
+/// What a participant says of itself.
+struct ParticipantInfo {
+  std::string name;       ///< as ParticipantOptions::name has it
+  std::string host;       ///< empty where another program does not say it
+  std::uint32_t pid = 0;  ///< likewise 0
+
+  /// "jostle_coordinator on lab-2, process 4711", as far as it is known.
+  std::string text() const;
+};
+
 /// A discovery server listens at an address, and introduces participants to each other.
 struct ServerOptions {
   std::string address = "0.0.0.0";  ///< IPv4 to listen at; 0.0.0.0: all of this host
@@ -81,6 +91,9 @@ class Participant {
   const std::string& space() const;
   /// Returns a topic's name, with the namespace in it where the scope asks for it.
   std::string wire_name(const std::string& topic, Scope scope) const;
+
+  /// Returns who the participant with that id() is, if it was found and has not gone.
+  std::optional<ParticipantInfo> find(std::uint64_t id) const;
 
   /// Returns names of the participants found so far, as ParticipantOptions::name has them; ours is among them.
   std::vector<std::string> others() const;

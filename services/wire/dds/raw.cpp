@@ -103,7 +103,7 @@ bool RawWriter::write(std::span<const std::byte> sample) {
 
 RawReader::RawReader(const Participant& participant, const RawTopic& topic, OnSample on_sample)
     : ReaderBase(participant, topic.name, topic.qos, TypeSupport(new RawType(topic.type)),
-                 [on_sample = std::move(on_sample)](const void* sample, const Origin& origin) {
+                 [on_sample = std::move(on_sample)](void* sample, const Origin& origin) {
                    on_sample(static_cast<const RawSample*>(sample)->bytes, origin);
                  }) {}
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
@@ -17,6 +18,7 @@ using namespace eprosima::fastdds::dds;
 DataReaderQos reader_qos(const Participant::Core& core, const std::string& topic, const Qos& qos) {
   DataReaderQos result = core.subscriber->get_default_datareader_qos();
   apply(qos, result);
+  result.resource_limits().max_instances = std::max(qos.instances, qos.instances_heard);
   // The file's word is in force instead, where it has one.
   for (const std::string& profile : profiles_for(core, topic, qos)) {
     if (core.subscriber->get_datareader_qos_from_profile(profile, result) == ReturnCode_t::RETCODE_OK) break;
@@ -35,7 +37,7 @@ Origin origin_of(const SampleInfo& info) {
 }  // namespace
 
 struct ReaderBase::Impl : DataReaderListener {
-  Impl(Participant owner, TypeSupport type_support, std::function<void(const void*, const Origin&)> callback)
+  Impl(Participant owner, TypeSupport type_support, std::function<void(void*, const Origin&)> callback)
       : participant(std::move(owner)), type(std::move(type_support)), on_sample(std::move(callback)) {}
 
   void on_data_available(DataReader* source) override {
@@ -52,7 +54,7 @@ struct ReaderBase::Impl : DataReaderListener {
     writers.update(iHandle2GUID(status.last_publication_handle), status.current_count_change);
   }
 
-  void call(const void* sample, const Origin& origin) {
+  void call(void* sample, const Origin& origin) {
     const std::lock_guard lock(mutex);
     if (closed) return;
     try {
@@ -64,7 +66,7 @@ struct ReaderBase::Impl : DataReaderListener {
 
   Participant participant;
   TypeSupport type;
-  std::function<void(const void*, const Origin&)> on_sample;
+  std::function<void(void*, const Origin&)> on_sample;
   eprosima::fastdds::dds::Topic* topic = nullptr;
   DataReader* reader = nullptr;
   Peers writers;
@@ -74,7 +76,7 @@ struct ReaderBase::Impl : DataReaderListener {
 };
 
 ReaderBase::ReaderBase(const Participant& participant, const std::string& topic, const Qos& qos, TypeSupport type,
-                       std::function<void(const void*, const Origin&)> on_sample)
+                       std::function<void(void*, const Origin&)> on_sample)
     : impl_(std::make_unique<Impl>(participant, type, std::move(on_sample))) {
   Participant::Core& core = participant.core();
   impl_->topic = core.acquire_topic(topic, type);

@@ -1,13 +1,15 @@
 #include "services/world/link/simulated_world.hpp"
 
-#include <spdlog/spdlog.h>
+#include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <thread>
 #include <utility>
 
 #include "physics_pool/objective/scorer.hpp"
 #include "robot_bridge/safety/command_check.hpp"
+#include "services/wire/limits.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 #include "services/world/link/messages.hpp"
 
@@ -17,7 +19,8 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kPublicationPeriod{50};  // of wall-clock time
-constexpr std::size_t kCommandQueue = 64;
+constexpr std::size_t kCommandQueue = 64;                    // of one participant
+constexpr std::size_t kPastEpochs = 64;                      // remembered, for commands that are late
 
 }  // namespace
 
@@ -53,49 +56,106 @@ Result<void> SimulatedWorld::run(std::stop_token stop) {
 }
 
 void SimulatedWorld::receive() {
-  for (const auto& command : std::exchange(waiting_, {})) accept(command);
-  for (const auto& command : commands_.take_all()) accept(command);
+  for (Letter& letter : std::exchange(waiting_, {})) accept(std::move(letter));
+  for (Letter& letter : commands_.take_letters()) accept(std::move(letter));
+  for (Newcomer& newcomer : std::exchange(newcomers_, {})) {
+    if (may_command(newcomer.letter)) {
+      accept(std::move(newcomer.letter));
+    } else if (steady_clock::now() < newcomer.since + wire::limits::kNewcomerWaits) {
+      newcomers_.push_back(std::move(newcomer));
+    } else {
+      foreign_.note("a command of participant {:016x} was dropped: the robot obeys participant {:016x}, which is there",
+                    newcomer.letter.writer, *commander_);
+    }
+  }
+  say_troubles();
+}
+
+void SimulatedWorld::say_troubles() {
+  stale_.say();
+  refused_.say();
+  foreign_.say();
 }
 
 // While an action is at work: whether its commander has had enough of it.
 bool SimulatedWorld::told_to_stop() {
   bool told = false;
-  for (auto& command : commands_.take_all()) {
+  for (Letter& letter : commands_.take_letters()) {
+    if (letter.writer != commander_) {
+      make_wait(std::move(letter));
+      continue;
+    }
+    const auto& command = letter.sample;
     told = told || (is_stop(command) && command.epoch() == epoch_ && command.sequence_number() > accepted_);
-    waiting_.push_back(std::move(command));
+    waiting_.push_back(std::move(letter));
     if (waiting_.size() > kCommandQueue) waiting_.pop_front();  // as the inbox does
   }
   return told;
 }
 
-void SimulatedWorld::accept(const jostle_msgs::msg::VelocityCommand& command) {
-  if (command.epoch() < epoch_ || (command.epoch() == epoch_ && command.sequence_number() <= accepted_)) {
-    spdlog::warn("command {}/{} is stale ({} so far), dropped", command.epoch(), command.sequence_number(), ++dropped_);
+bool SimulatedWorld::may_command(const Letter& letter) const {
+  return !commander_ || letter.writer == *commander_ || !commands_.hears(*commander_);
+}
+
+// The newest command of each counts.
+void SimulatedWorld::make_wait(Letter letter) {
+  const auto same =
+      std::ranges::find_if(newcomers_, [&](const Newcomer& other) { return other.letter.writer == letter.writer; });
+  if (same != newcomers_.end()) {
+    same->letter = std::move(letter);
+    foreign_.note("commands of participant {:016x} were dropped: the robot obeys participant {:016x}, which is there",
+                  same->letter.writer, *commander_);
     return;
   }
-  if (is_stop(command) && command.epoch() == epoch_) {
-    accepted_ = finished_ = command.sequence_number();
+  if (newcomers_.size() >= wire::limits::kSendersPerInbox) newcomers_.pop_front();
+  newcomers_.push_back({std::move(letter), steady_clock::now()});
+}
+
+void SimulatedWorld::accept(Letter letter) {
+  if (!may_command(letter)) return make_wait(std::move(letter));
+  const auto& command = letter.sample;
+  const bool known = letter.writer == commander_ && command.epoch() == epoch_;
+  const bool over = !known && std::ranges::find(past_epochs_, command.epoch()) != past_epochs_.end();
+  if (over || (known && command.sequence_number() <= accepted_)) {
+    stale_.note("command {}/{} is stale, dropped", command.epoch(), command.sequence_number());
+    return;
+  }
+  if (known || begin(command, letter.writer)) obey(command);
+}
+
+// Whether a newcomer, or a new epoch, takes over: with a good command only, for the present commander must not suffer
+// for a bad one.
+bool SimulatedWorld::begin(const jostle_msgs::msg::VelocityCommand& command, std::uint64_t writer) {
+  const auto check_result = robot_bridge::check_command(command.velocities(), limits_, command.duration());
+  if (!check_result) {
+    refused_.note("command {}/{} of a newcomer: {}; refused", command.epoch(), command.sequence_number(),
+                  check_result.error().message);
+    return false;
+  }
+  if (commander_) past_epochs_.push_back(epoch_);
+  if (past_epochs_.size() > kPastEpochs) past_epochs_.pop_front();
+  commander_ = writer;
+  epoch_ = command.epoch();
+  finished_ = accepted_ = 0;
+  actions_.clear();
+  waiting_.clear();
+  return true;
+}
+
+void SimulatedWorld::obey(const jostle_msgs::msg::VelocityCommand& command) {
+  accepted_ = command.sequence_number();
+  if (is_stop(command)) {
+    finished_ = accepted_;
     actions_.clear();
     error_.clear();
     publish();
     return;
   }
   const auto check_result = robot_bridge::check_command(command.velocities(), limits_, command.duration());
-  if (!check_result && command.epoch() > epoch_) {  // the present commander must not suffer for it
-    spdlog::warn("command {}/{} of a newcomer: {}; refused", command.epoch(), command.sequence_number(),
-                 check_result.error().message);
-    return;
-  }
-  if (command.epoch() > epoch_) {  // a new commander takes over
-    epoch_ = command.epoch();
-    finished_ = 0;
-    actions_.clear();
-  }
-  accepted_ = command.sequence_number();
   if (!check_result) {
     error_ = fmt::format("command {}: {}", command.sequence_number(), check_result.error().message);
     if (actions_.empty()) finished_ = accepted_;  // nobody waits for an earlier one
-    spdlog::warn("{}; refused", error_);
+    refused_.note("{}; refused", error_);
     publish();
     return;
   }
@@ -129,7 +189,7 @@ Result<void> SimulatedWorld::act(const Action& action, std::stop_token stop) {
 Result<void> SimulatedWorld::rest(std::stop_token stop) {
   publish_when_due();
   if (!options_.free_running) {
-    if (auto command = commands_.take(next_publication_, stop)) accept(*command);
+    if (auto letter = commands_.take_letter(next_publication_, stop)) accept(*std::move(letter));
     return {};
   }
   const double time_step = world_.world().time_step();

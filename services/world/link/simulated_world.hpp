@@ -2,13 +2,16 @@
 /// \file
 /// The execution world as a process of its own.
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <stop_token>
 #include <string>
 
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/scene/scene.hpp"
+#include "services/common/process/trouble.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/reader.hpp"
 #include "services/wire/dds/topics.hpp"
@@ -30,9 +33,11 @@ struct SimulatedWorldOptions {
 /// Executes velocity commands one after the other and publishes joint states,
 /// object states, poses and transforms: all of them measurements, not truth.
 ///
-/// Commands carry the commander's epoch and a sequence number; one from an
-/// older epoch or already done is counted and dropped, a bad one is refused in
-/// `RobotStatus.error`. A newer epoch takes over with its first good command.
+/// It obeys one commander at a time: a participant, and an epoch of its choice that means one
+/// task. Nobody else is obeyed as long as the middleware hears the commander; then the first
+/// good command is, and a newcomer that comes sooner waits for some seconds. A commander's new
+/// epoch ends its old one for good. Commands carry a sequence number; one that is done already is
+/// counted and dropped, a bad one of the commander is refused in `RobotStatus.error`.
 /// A stop (messages.hpp) ends the command at work at once; everything else waits
 /// for its turn. The robot stands still when no command is at work.
 class SimulatedWorld {
@@ -51,9 +56,21 @@ class SimulatedWorld {
     long steps = 0;  // engine steps
   };
 
+  using Letter = wire::Inbox<jostle_msgs::msg::VelocityCommand>::Letter;
+  /// Somebody who would command, and waits until nobody does.
+  struct Newcomer {
+    Letter letter;
+    std::chrono::steady_clock::time_point since;
+  };
+
   void receive();
   bool told_to_stop();
-  void accept(const jostle_msgs::msg::VelocityCommand& command);
+  bool may_command(const Letter& letter) const;
+  void make_wait(Letter letter);
+  void accept(Letter letter);
+  void obey(const jostle_msgs::msg::VelocityCommand& command);
+  bool begin(const jostle_msgs::msg::VelocityCommand& command, std::uint64_t writer);
+  void say_troubles();
   Result<void> act(const Action& action, std::stop_token stop);
   Result<void> rest(std::stop_token stop);
   void publish();
@@ -61,15 +78,20 @@ class SimulatedWorld {
 
   SimulatedWorldOptions options_;
   physics_pool::ExecutionWorld world_;
-  std::vector<double> limits_;                             // largest speeds of the axes, m/s or rad/s
-  std::vector<double> still_;                              // the control that moves nothing
-  std::deque<jostle_msgs::msg::VelocityCommand> waiting_;  // came while an action was at work
+  std::vector<double> limits_;      // largest speeds of the axes, m/s or rad/s
+  std::vector<double> still_;       // the control that moves nothing
+  std::deque<Letter> waiting_;      // the commander's, came while an action was at work
+  std::deque<Newcomer> newcomers_;  // the newest command of each
   std::deque<Action> actions_;
-  std::uint64_t epoch_ = 0;     // of the commander
-  std::uint64_t finished_ = 0;  // its last finished, stopped or refused command
-  std::uint64_t accepted_ = 0;  // its last accepted command
-  std::uint64_t dropped_ = 0;   // stale commands
-  bool moved_ = false;          // a command was begun
+  std::optional<std::uint64_t> commander_;  // its participant
+  std::uint64_t epoch_ = 0;                 // of the commander
+  std::deque<std::uint64_t> past_epochs_;   // that have ended
+  std::uint64_t finished_ = 0;              // the commander's last finished, stopped or refused command
+  std::uint64_t accepted_ = 0;              // its last accepted command
+  common::Trouble stale_{"stale commands"};
+  common::Trouble refused_{"refused commands"};
+  common::Trouble foreign_{"commands of others"};
+  bool moved_ = false;  // a command was begun
   bool busy_ = false;
   std::string error_;
   std::chrono::steady_clock::time_point next_publication_;

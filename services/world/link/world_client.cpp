@@ -1,9 +1,10 @@
 #include "services/world/link/world_client.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "robot_bridge/safety/command_check.hpp"
+#include "services/common/process/random_id.hpp"
+#include "services/wire/limits.hpp"
 #include "services/world/link/messages.hpp"
 
 namespace jostle::world {
@@ -13,16 +14,11 @@ using std::chrono::steady_clock;
 
 constexpr std::size_t kQueue = 64;  // a few seconds of states
 
-// Later runs have larger epochs, so a world can tell an old commander's
-// command from a new one's.
-std::uint64_t epoch_now() {
-  return static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
-}
-
 Error silent(const char* who, const std::string& topic, std::chrono::milliseconds time, bool heard) {
   return {Code::kUnavailable,
-          heard ? fmt::format("{}: nothing heard on {} for {:.1f} s; the process ended or is stalled", who, topic,
-                              time.count() / 1e3)
+          heard ? fmt::format("{}: nothing heard on {} for {:.1f} s; its process ended, is stalled or cut off (`jostle "
+                              "doctor` checks the network)",
+                              who, topic, time.count() / 1e3)
                 : fmt::format("{}: nobody publishes {} ({:.1f} s waited); start one with `jostle sim SCENE` "
                               "on the same ROS_DOMAIN_ID",
                               who, topic, time.count() / 1e3)};
@@ -34,36 +30,47 @@ RobotClient::RobotClient(const wire::Participant& participant, const WorldClient
     : options_(options),
       status_(participant, wire::topics::kRobotStatus, kQueue),
       command_(participant, wire::topics::kRobotCommand),
-      epoch_(epoch_now()) {}
+      epoch_(common::random_id()) {}
+
+// The first that reads our commands, as long as it is there. Once it has a command it stays who it is: another robot
+// does not know what this one has done.
+bool RobotClient::is_robot(std::uint64_t writer) {
+  const bool there = robot_ && status_.hears(*robot_);
+  if (robot_ != writer && !there && sequence_number_ == 0 && command_.reaches(writer)) robot_ = writer;
+  return robot_ == writer || !robot_;
+}
 
 Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::stop_token stop) {
   const auto patience = heard_ ? options_.silence : options_.start;
   const auto deadline = steady_clock::now() + patience;
   std::string problem;
   for (;;) {
-    auto status = status_.take(deadline, stop);
+    auto letter = status_.take_letter(deadline, stop);
     if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped on request"};
-    if (!status) {
+    if (!letter) {
       if (problem.empty()) return silent("robot", wire::topics::kRobotStatus.name, patience, heard_);
       return Error{Code::kInvalidArgument, problem + "; no good status followed"};
     }
-    if (auto reading_result = from_message(*status); !reading_result) {
-      problem = wire::topics::kRobotStatus.name + ": " + reading_result.error().message;
-      spdlog::warn("{}; status {} rejected", problem, ++rejected_);
+    jostle_msgs::msg::RobotStatus& status = letter->sample;
+    if (!is_robot(letter->writer)) {
+      foreign_.warn("{}: a status of participant {:016x} was dropped: the robot is participant {:016x}",
+                    wire::topics::kRobotStatus.name, letter->writer, *robot_);
       continue;
     }
-    if (sequence_number_ > 0 && status->epoch() > epoch_) {
-      return Error{Code::kUnavailable, fmt::format("robot: another commander took over: its epoch is {}, ours {}",
-                                                   status->epoch(), epoch_)};
+    if (auto reading_result = from_message(status); !reading_result) {
+      problem = wire::topics::kRobotStatus.name + ": " + reading_result.error().message;
+      rejected_.warn("{}; rejected", problem);
+      continue;
     }
-    if (known_ && status->epoch() < epoch_) {
-      return Error{Code::kUnavailable, "robot: the world was started anew and knows nothing of this task"};
+    if (known_ && status.epoch() != epoch_) {
+      return Error{Code::kUnavailable, fmt::format("robot: another commander took over: its epoch is {:x}, ours {:x}",
+                                                   status.epoch(), epoch_)};
     }
-    known_ = known_ || status->epoch() == epoch_;
+    known_ = known_ || (sequence_number_ > 0 && status.epoch() == epoch_);
     heard_ = true;
-    limits_ = status->limits();
-    time_ = seconds(status->header());
-    return *std::move(status);
+    limits_ = status.limits();
+    time_ = seconds(status.header());
+    return std::move(status);
   }
 }
 
@@ -82,7 +89,7 @@ Result<robot_bridge::RobotReading> RobotClient::read() {
 Result<void> RobotClient::wait_for_robot(std::stop_token stop) {
   const auto deadline = steady_clock::now() + options_.start;
   // Statuses come many times a second; each may be of another, newer robot.
-  while (!heard_ || !command_.reaches(*status_.last_writer())) {
+  while (!heard_ || !robot_ || !command_.reaches(*robot_)) {
     if (steady_clock::now() >= deadline) {
       return Error{Code::kUnavailable, fmt::format("robot: who publishes {} does not read {} ({:.1f} s waited)",
                                                    wire::topics::kRobotStatus.name, wire::topics::kRobotCommand.name,
@@ -94,12 +101,16 @@ Result<void> RobotClient::wait_for_robot(std::stop_token stop) {
 }
 
 Result<void> RobotClient::wait_until_finished(std::stop_token stop) {
+  auto idle_since = steady_clock::now();
   for (;;) {
     auto status_result = next_status(stop);
     if (!status_result) return status_result.error();
+    const auto now = steady_clock::now();
+    if (status_result->busy()) idle_since = now;
+    if (now - idle_since > options_.start) return not_taken(*status_result);
     if (status_result->epoch() != epoch_) continue;
     const bool finished = status_result->sequence_number() >= sequence_number_;
-    const std::string& error = status_result->error();
+    const std::string error = common::shown(status_result->error(), wire::limits::kShownError);
     if (error.empty() || (!finished && error == refusal_)) {  // or an earlier command's
       if (finished) return {};
       continue;
@@ -107,6 +118,18 @@ Result<void> RobotClient::wait_until_finished(std::stop_token stop) {
     refusal_ = error;
     return Error{Code::kInvalidArgument, "robot: " + error};
   }
+}
+
+// The robot stands still, and does not say that it has our command.
+Error RobotClient::not_taken(const jostle_msgs::msg::RobotStatus& status) const {
+  const double seconds = static_cast<double>(options_.start.count()) / 1e3;
+  if (status.epoch() == epoch_ || status.epoch() == 0) {
+    return {Code::kUnavailable, fmt::format("robot: command {} was sent, and nothing of it was heard for {:.1f} s",
+                                            sequence_number_, seconds)};
+  }
+  return {Code::kUnavailable, fmt::format("robot: it obeys another commander, of epoch {:x}, and took no command of "
+                                          "ours for {:.1f} s; wait until that one's task is over, or end it",
+                                          status.epoch(), seconds)};
 }
 
 Result<void> RobotClient::halt() {
@@ -153,19 +176,23 @@ Result<std::vector<perception::ObjectReading>> ObjectsClient::read() {
   std::string problem;
   constexpr double kSameTime = 1e-6;  // s, rounding of stamps
   while (newest_.empty() || time_ < robot_.time() - kSameTime) {
-    auto message = states_.take(deadline);
-    if (!message) {
+    auto letter = states_.take_letter(deadline);
+    if (!letter) {
       if (problem.empty()) return silent("objects", wire::topics::kObjectStates.name, patience, time_ >= 0);
       return Error{Code::kInvalidArgument, problem + "; no good measurement followed"};
     }
-    auto readings_result = from_message(*message);
+    if (const auto robot = robot_.participant(); robot && letter->writer != *robot && states_.hears(*robot)) {
+      foreign_.warn("{}: a measurement of participant {:016x} was dropped: the robot's world is participant {:016x}",
+                    wire::topics::kObjectStates.name, letter->writer, *robot);
+      continue;
+    }
+    auto readings_result = from_message(letter->sample);
     if (readings_result) {
       newest_ = std::move(readings_result).value();
-      time_ = seconds(message->header());
+      time_ = seconds(letter->sample.header());
     } else {
-      ++rejected_;
       problem = wire::topics::kObjectStates.name + ": " + readings_result.error().message;
-      spdlog::warn("{}; measurement {} rejected", problem, rejected_);
+      rejected_.warn("{}; rejected", problem);
     }
   }
   return newest_;

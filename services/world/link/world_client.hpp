@@ -6,11 +6,13 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "perception/api/object_source.hpp"
 #include "robot_bridge/api/robot.hpp"
+#include "services/common/process/trouble.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/reader.hpp"
 #include "services/wire/dds/topics.hpp"
@@ -19,8 +21,9 @@
 namespace jostle::world {
 
 struct WorldClientOptions {
-  /// A robot or a world not heard for this long is reported as gone.
-  std::chrono::milliseconds silence{1000};
+  /// A robot or a world that something waits for, and that is not heard for this long, is reported as gone. Shorter,
+  /// and one that is only slow, on a machine whose workers take all cores, is taken for dead.
+  std::chrono::milliseconds silence{5000};
   /// Grace for discovery before the first message.
   std::chrono::milliseconds start{5000};
 };
@@ -28,7 +31,9 @@ struct WorldClientOptions {
 /// Commands go to `rt/robot/command`; `rt/robot/status` tells when one is done. A stop
 /// request is passed on, and answered with kCancelled once the robot says that it obeyed.
 /// Bad statuses are counted, reported and skipped; only if nothing good follows
-/// are they an error. A commander with a newer epoch, whom the robot obeys, is an error, too.
+/// are they an error. The robot is the participant that speaks and reads our commands; what others say
+/// of it is dropped and counted. That it obeys another commander, or does not take a command, is an
+/// error, too.
 class RobotClient final : public robot_bridge::Robot {
  public:
   RobotClient(const wire::Participant& participant, const WorldClientOptions& options = {});
@@ -39,7 +44,13 @@ class RobotClient final : public robot_bridge::Robot {
   /// Returns the time stamp of the newest status, s of the world's clock.
   double time() const { return time_; }
 
+  /// Returns Participant::id() of the robot, once it was heard.
+  std::optional<std::uint64_t> participant() const { return robot_; }
+
  private:
+  /// Whether a status that this participant wrote is the robot's.
+  bool is_robot(std::uint64_t writer);
+
   /// Waits for the next good status.
   Result<jostle_msgs::msg::RobotStatus> next_status(std::stop_token stop);
 
@@ -48,6 +59,7 @@ class RobotClient final : public robot_bridge::Robot {
 
   /// Waits until the command of sequence_number_ is finished or refused.
   Result<void> wait_until_finished(std::stop_token stop);
+  Error not_taken(const jostle_msgs::msg::RobotStatus& status) const;
 
   /// Makes the robot stand still. Error kUnavailable: it does not say that it does.
   Result<void> halt();
@@ -57,16 +69,19 @@ class RobotClient final : public robot_bridge::Robot {
   wire::Writer<jostle_msgs::msg::VelocityCommand> command_;
   const std::uint64_t epoch_;
   std::uint64_t sequence_number_ = 0;
-  std::string refusal_;  // the last one heard; it is repeated until the next good command
+  std::string refusal_;                 // the last one heard; it is repeated until the next good command
+  std::optional<std::uint64_t> robot_;  // its participant
   bool heard_ = false;
   std::vector<double> limits_;  // per axis, of the newest status
   bool known_ = false;          // a status has named our epoch
   double time_ = 0.0;
-  std::uint64_t rejected_ = 0;
+  common::Trouble rejected_{"bad statuses"};
+  common::Trouble foreign_{"statuses of others"};
 };
 
 /// Reads object states from `rt/objects/states`, never older than the robot's newest
-/// status, so that both describe one moment. Bad measurements are counted,
+/// status, so that both describe one moment. Where the robot's participant speaks of objects,
+/// as a simulated world does, nobody else is listened to. Bad measurements are counted,
 /// reported and skipped; only if nothing good follows are they an error.
 class ObjectsClient final : public perception::ObjectSource {
  public:
@@ -74,7 +89,7 @@ class ObjectsClient final : public perception::ObjectSource {
 
   Result<std::vector<perception::ObjectReading>> read() override;
 
-  std::uint64_t rejected() const { return rejected_; }
+  std::uint64_t rejected() const { return rejected_.count(); }
 
  private:
   const RobotClient& robot_;
@@ -82,7 +97,8 @@ class ObjectsClient final : public perception::ObjectSource {
   wire::Inbox<jostle_msgs::msg::ObjectStates> states_;
   std::vector<perception::ObjectReading> newest_;
   double time_ = -1.0;  // s, stamp of newest_; before the first: none
-  std::uint64_t rejected_ = 0;
+  common::Trouble rejected_{"bad measurements"};
+  common::Trouble foreign_{"measurements of others"};
 };
 
 }  // namespace jostle::world

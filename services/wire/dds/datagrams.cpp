@@ -1,0 +1,221 @@
+#include "services/wire/dds/datagrams.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+
+#include "idl/types/hash.hpp"
+#include "services/wire/limits.hpp"
+
+namespace jostle::wire {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+// Kinds of submessages, RTPS 2.5, 9.4.5.1.1; the last is Fast DDS's own.
+enum Kind : std::uint8_t {
+  kPad = 0x01,
+  kAckNack = 0x06,
+  kHeartbeat = 0x07,
+  kGap = 0x08,
+  kInfoTimestamp = 0x09,
+  kInfoSource = 0x0c,
+  kNackFragments = 0x12,
+  kHeartbeatFragments = 0x13,
+  kData = 0x15,
+  kDataFragments = 0x16,
+  kStatisticsOfFastDds = 0x80
+};
+
+constexpr std::size_t kHeader = 20;  // bytes: "RTPS", version, vendor, prefix of the GUID
+constexpr std::size_t kVendor = 6;
+constexpr std::size_t kPrefix = 8;
+constexpr std::size_t kPrefixSize = 12;
+constexpr std::uint32_t kMostBits = 256;  // of a set of numbers
+// Silent writers are forgotten when the table is full.
+constexpr std::chrono::seconds kSilent{10};
+
+// One submessage, its header read.
+struct Submessage {
+  std::uint8_t kind = 0;
+  bool little_endian = true;
+  bool last = false;
+  Bytes body;
+
+  template <class Number>
+  Number number(std::size_t at) const {
+    Number value = 0;
+    for (std::size_t i = 0; i < sizeof(Number); ++i) {
+      const std::size_t place = little_endian ? at + sizeof(Number) - 1 - i : at + i;
+      value = static_cast<Number>(value << 8 | body[place]);
+    }
+    return value;
+  }
+
+  // A sequence number: the high half first, whatever the byte order.
+  std::int64_t sequence(std::size_t at) const {
+    const auto high = static_cast<std::int32_t>(number<std::uint32_t>(at));
+    return static_cast<std::int64_t>(high) * (std::int64_t{1} << 32) + number<std::uint32_t>(at + 4);
+  }
+};
+
+// The submessage that begins at a place; nothing if it is longer than what is left.
+std::optional<Submessage> submessage_at(Bytes datagram, std::size_t at) {
+  if (datagram.size() - at < 4) return {};
+  Submessage result{.kind = datagram[at], .little_endian = (datagram[at + 1] & 1) != 0};
+  result.body = datagram.subspan(at, 4);
+  const std::size_t length = result.number<std::uint16_t>(2), left = datagram.size() - at - 4;
+  if (length > left) return {};
+  result.last = length == 0 && result.kind != kInfoTimestamp && result.kind != kPad;
+  result.body = datagram.subspan(at + 4, result.last ? left : length);
+  return result;
+}
+
+std::size_t least_size(std::uint8_t kind) {
+  switch (kind) {
+    case kData:
+    case kInfoSource:
+      return 20;
+    case kDataFragments:
+      return 32;
+    case kHeartbeat:
+      return 28;
+    case kGap:
+      return 28;
+    case kAckNack:
+    case kHeartbeatFragments:
+      return 24;
+    case kNackFragments:
+      return 28;
+    default:
+      return 0;
+  }
+}
+
+bool is_of_fast_dds(Bytes datagram) { return datagram[kVendor] == 1 && datagram[kVendor + 1] == 15; }
+
+// Where Fast DDS looks for its statistics it takes lengths as they are; where it reads, it rounds them up to four.
+bool statistics_come_last(Bytes datagram, std::size_t round_to) {
+  for (std::size_t at = kHeader; at < datagram.size();) {
+    const auto submessage = submessage_at(datagram, at);
+    if (!submessage || submessage->last) return true;
+    const std::size_t end = at + 4 + submessage->body.size();
+    if (submessage->kind == kStatisticsOfFastDds && end != datagram.size()) return false;
+    at = (end + round_to - 1) / round_to * round_to;
+  }
+  return true;
+}
+
+}  // namespace
+
+const char* to_string(Flaw flaw) {
+  switch (flaw) {
+    case Flaw::kNone:
+      return "nothing";
+    case Flaw::kMalformed:
+      return "it is malformed";
+    case Flaw::kStatistics:
+      return "a statistics submessage is not its last one";
+    case Flaw::kNumber:
+      return "it has a sequence number that its writer cannot have reached";
+    case Flaw::kFragments:
+      return "it is a fragment of a sample larger than any";
+  }
+  return "";
+}
+
+std::size_t Judge::HashGuid::operator()(const Guid& guid) const {
+  return hash_of(std::string_view(reinterpret_cast<const char*>(guid.data()), guid.size())).low;
+}
+
+Flaw Judge::judge(Bytes datagram, TimePoint now) {
+  if (datagram.size() < kHeader || std::memcmp(datagram.data(), "RTPS", 4) != 0) return Flaw::kMalformed;
+  if (is_of_fast_dds(datagram) && !(statistics_come_last(datagram, 1) && statistics_come_last(datagram, 4))) {
+    return Flaw::kStatistics;
+  }
+  Guid writer{};
+  const auto take_prefix = [&](Bytes from) { std::copy_n(from.begin(), kPrefixSize, writer.begin()); };
+  take_prefix(datagram.subspan(kPrefix));
+  for (std::size_t at = kHeader; at < datagram.size();) {
+    const auto submessage = submessage_at(datagram, at);
+    if (!submessage || submessage->body.size() < least_size(submessage->kind)) return Flaw::kMalformed;
+    const Submessage& part = *submessage;
+    const auto is_plausible = [&](std::size_t place_of_writer, std::int64_t number, std::int64_t left_out = 0) {
+      std::copy_n(part.body.begin() + static_cast<std::ptrdiff_t>(place_of_writer), 4, writer.begin() + kPrefixSize);
+      return plausible(writer, number, left_out, now);
+    };
+    switch (part.kind) {
+      case kInfoSource:
+        take_prefix(part.body.subspan(8));
+        break;
+      case kData:
+        if (!is_plausible(8, part.sequence(12))) return Flaw::kNumber;
+        break;
+      case kDataFragments: {
+        if (!is_plausible(8, part.sequence(12))) return Flaw::kNumber;
+        const std::uint32_t piece = part.number<std::uint16_t>(26), sample = part.number<std::uint32_t>(28);
+        if (piece == 0 || sample > limits::kFragmentedSample || sample / piece > limits::kFragments)
+          return Flaw::kFragments;
+        break;
+      }
+      case kHeartbeat: {
+        const std::int64_t first = part.sequence(8), last = part.sequence(16);
+        if (first < 0 || last < 0 || !is_plausible(4, std::max(first - 1, last))) return Flaw::kNumber;
+        break;
+      }
+      case kGap: {
+        const std::int64_t start = part.sequence(8), base = part.sequence(16);
+        if (part.number<std::uint32_t>(24) > kMostBits) return Flaw::kMalformed;
+        if (start < 0 || base < start || !is_plausible(4, base - 1, base - start)) return Flaw::kNumber;
+        break;
+      }
+      case kHeartbeatFragments:
+        if (!is_plausible(4, part.sequence(8))) return Flaw::kNumber;
+        break;
+      case kAckNack:
+        if (part.number<std::uint32_t>(16) > kMostBits) return Flaw::kMalformed;
+        if (part.sequence(8) < 0) return Flaw::kNumber;
+        break;
+      case kNackFragments:
+        if (part.number<std::uint32_t>(20) > kMostBits) return Flaw::kMalformed;
+        if (part.sequence(8) < 0) return Flaw::kNumber;
+        break;
+      default:
+        break;
+    }
+    if (part.last) break;
+    at += 4 + (part.body.size() + 3) / 4 * 4;
+  }
+  return Flaw::kNone;
+}
+
+bool Judge::plausible(const Guid& writer, std::int64_t number, std::int64_t left_out, TimePoint now) {
+  if (number < 0) return false;
+  const std::lock_guard lock(mutex_);
+  const auto found = writers_.find(writer);
+  if (found == writers_.end()) {
+    if (std::max(number, left_out) > limits::kFirstNumber) return false;
+    if (writers_.size() >= limits::kWritersRemembered) forget_silent(now);
+    if (writers_.size() < limits::kWritersRemembered) {
+      writers_.emplace(writer, Progress{.number = number, .budget = limits::kNumberLeap, .heard = now});
+    }
+    return true;
+  }
+  Progress& progress = found->second;
+  // Saturates after minutes of silence, long before anything overflows.
+  const double silence = std::min(std::chrono::duration<double>(now - progress.heard).count(), 1000.0);
+  progress.budget = std::min(progress.budget, limits::kNumberLeap) +
+                    static_cast<std::int64_t>(silence * static_cast<double>(limits::kNumbersPerSecond));
+  progress.heard = now;
+  const std::int64_t price = std::max({number - progress.number, left_out, std::int64_t{0}});
+  if (price > std::min(progress.budget, limits::kFirstNumber)) return false;
+  progress.budget -= price;
+  progress.number = std::max(progress.number, number);
+  return true;
+}
+
+void Judge::forget_silent(TimePoint now) {
+  std::erase_if(writers_, [&](const auto& entry) { return entry.second.heard + kSilent < now; });
+}
+
+}  // namespace jostle::wire

@@ -1,0 +1,186 @@
+// What is let through to the middleware.
+
+#include "services/wire/dds/datagrams.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "services/wire/limits.hpp"
+
+namespace jostle::wire {
+namespace {
+
+using namespace std::chrono_literals;
+using Bytes = std::vector<std::uint8_t>;
+
+void append(Bytes& bytes, std::uint64_t number, int size) {
+  for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(number >> (8 * i)));
+}
+
+// High half first, each in little-endian order.
+void append_sequence(Bytes& bytes, std::int64_t number) {
+  append(bytes, static_cast<std::uint64_t>(number) >> 32, 4);
+  append(bytes, static_cast<std::uint64_t>(number), 4);
+}
+
+// The header of a message of Fast DDS; `who` tells participants apart.
+Bytes header(std::uint8_t who = 1) {
+  Bytes bytes{'R', 'T', 'P', 'S', 2, 3, 1, 15};
+  bytes.resize(20, who);
+  return bytes;
+}
+
+Bytes& operator+=(Bytes& bytes, const Bytes& more) {
+  bytes.insert(bytes.end(), more.begin(), more.end());
+  return bytes;
+}
+
+Bytes submessage(std::uint8_t kind, const Bytes& body) {
+  Bytes bytes{kind, 1};
+  append(bytes, body.size(), 2);
+  return bytes += body;
+}
+
+constexpr std::uint32_t kWriter = 0xc2030000;
+
+Bytes data(std::int64_t number, std::uint32_t writer = kWriter) {
+  Bytes body;
+  append(body, 0x00100000, 4);
+  append(body, 0, 4);
+  append(body, writer, 4);
+  append_sequence(body, number);
+  return submessage(0x15, body);
+}
+
+Bytes heartbeat(std::int64_t first, std::int64_t last, std::uint32_t writer = kWriter) {
+  Bytes body;
+  append(body, 0, 4);
+  append(body, writer, 4);
+  append_sequence(body, first);
+  append_sequence(body, last);
+  append(body, 1, 4);
+  return submessage(0x07, body);
+}
+
+Bytes gap(std::int64_t start, std::int64_t base, std::uint32_t bits = 0) {
+  Bytes body;
+  append(body, 0, 4);
+  append(body, kWriter, 4);
+  append_sequence(body, start);
+  append_sequence(body, base);
+  append(body, bits, 4);
+  return submessage(0x08, body);
+}
+
+Bytes fragments(std::uint16_t piece, std::uint32_t sample) {
+  Bytes body;
+  append(body, 0x00100000, 4);
+  append(body, 0, 4);
+  append(body, kWriter, 4);
+  append_sequence(body, 1);
+  append(body, 1, 4);
+  append(body, 1, 2);
+  append(body, piece, 2);
+  append(body, sample, 4);
+  return submessage(0x16, body);
+}
+
+Bytes statistics(std::size_t size = 56) { return submessage(0x80, Bytes(size, 0)); }
+
+class Datagrams : public ::testing::Test {
+ protected:
+  Flaw judge(const Bytes& parts, std::uint8_t who = 1) {
+    Bytes datagram = header(who);
+    return sut.judge(datagram += parts, now);
+  }
+
+  Judge sut;
+  Judge::TimePoint now{};
+};
+
+TEST_F(Datagrams, OfAnOrdinaryExchangePass) {
+  EXPECT_EQ(judge(heartbeat(1, 0)), Flaw::kNone);
+  for (std::int64_t number = 1; number < 100; ++number) {
+    Bytes parts = data(number);
+    parts += heartbeat(1, number);
+    EXPECT_EQ(judge(parts += statistics()), Flaw::kNone);
+  }
+  EXPECT_EQ(judge(gap(3, 90)), Flaw::kNone);
+  EXPECT_EQ(judge(fragments(65000, 200'000)), Flaw::kNone);
+  EXPECT_EQ(judge(submessage(0x09, Bytes{})), Flaw::kNone);    // a time without a time
+  EXPECT_EQ(judge(submessage(0x30, Bytes(13))), Flaw::kNone);  // encrypted, of any length
+}
+
+TEST_F(Datagrams, WithStatisticsThatAreNotTheLastAreDropped) {
+  for (const std::size_t more : {1, 2, 4}) {
+    Bytes parts = statistics();
+    EXPECT_EQ(judge(parts += Bytes(more, 0)), Flaw::kStatistics) << more;
+  }
+  Bytes hidden = submessage(0x0e, Bytes(17));  // the middleware looks for statistics without rounding up to four
+  EXPECT_EQ(judge((hidden += statistics()) += Bytes(3, 0)), Flaw::kStatistics);
+}
+
+TEST_F(Datagrams, ThatAreNoneOrCutAreDropped) {
+  EXPECT_EQ(sut.judge({}, now), Flaw::kMalformed);
+  EXPECT_EQ(sut.judge(Bytes(100, 'x'), now), Flaw::kMalformed);
+  for (const Bytes& whole : {data(1), heartbeat(1, 5), gap(1, 2), fragments(1000, 5000)}) {
+    for (std::size_t size = 1; size < whole.size(); ++size) {
+      EXPECT_NE(judge(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size))), Flaw::kNone) << size;
+    }
+  }
+  EXPECT_EQ(judge(gap(1, 2, 257)), Flaw::kMalformed);
+}
+
+TEST_F(Datagrams, OfAbsurdNumbersAreDroppedFromStrangersToo) {
+  constexpr std::int64_t kAbsurd = std::int64_t{1} << 40;
+  EXPECT_EQ(judge(heartbeat(kAbsurd, kAbsurd)), Flaw::kNumber);
+  EXPECT_EQ(judge(heartbeat(1, kAbsurd)), Flaw::kNumber);
+  EXPECT_EQ(judge(heartbeat(-5, 3)), Flaw::kNumber);
+  EXPECT_EQ(judge(data(kAbsurd)), Flaw::kNumber);
+  EXPECT_EQ(judge(gap(1, kAbsurd)), Flaw::kNumber);
+  EXPECT_EQ(judge(gap(9, 2)), Flaw::kNumber);
+}
+
+TEST_F(Datagrams, InTheNameOfAKnownWriterLeapNoFurtherThanItCan) {
+  ASSERT_EQ(judge(data(1000)), Flaw::kNone);
+  now += 10ms;
+
+  EXPECT_EQ(judge(heartbeat(limits::kFirstNumber / 2, limits::kFirstNumber / 2)), Flaw::kNumber);
+  EXPECT_EQ(judge(data(1000 + limits::kNumberLeap)), Flaw::kNone);
+  EXPECT_EQ(judge(data(1000 + 2 * limits::kNumberLeap)), Flaw::kNumber);
+  EXPECT_EQ(judge(data(1001), 2), Flaw::kNone) << "another participant's numbers are its own";
+}
+
+TEST_F(Datagrams, OfAWriterThatWasSilentForLongPass) {
+  ASSERT_EQ(judge(data(1000)), Flaw::kNone);
+  now += 1h;
+  EXPECT_EQ(judge(data(50'000'000)), Flaw::kNone);
+}
+
+TEST_F(Datagrams, OfALongLivedWriterPassHoweverHighItsNumbers) {
+  std::int64_t number = limits::kFirstNumber;
+  ASSERT_EQ(judge(data(number)), Flaw::kNone);
+  for (int i = 0; i < 1000; ++i) {
+    now += 1s;
+    number += 900'000;
+    ASSERT_EQ(judge(data(number)), Flaw::kNone) << number;
+  }
+  EXPECT_GT(number, 2 * limits::kFirstNumber);
+}
+
+TEST_F(Datagrams, WithFragmentsOfGiantsAreDropped) {
+  EXPECT_EQ(judge(fragments(65000, UINT32_MAX)), Flaw::kFragments);
+  EXPECT_EQ(judge(fragments(4, 200'000'000)), Flaw::kFragments);
+  EXPECT_EQ(judge(fragments(0, 1000)), Flaw::kFragments);
+}
+
+TEST_F(Datagrams, OfCountlessWritersTakeNoMemoryForEver) {
+  for (std::uint32_t i = 0; i < 10 * limits::kWritersRemembered; ++i) {
+    ASSERT_EQ(judge(data(1, i)), Flaw::kNone);
+  }
+  EXPECT_EQ(judge(data(limits::kFirstNumber + 1, 0xffffff)), Flaw::kNumber);
+}
+
+}  // namespace
+}  // namespace jostle::wire

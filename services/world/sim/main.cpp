@@ -19,7 +19,8 @@ int main(int argc, char** argv) {
   std::string scene_file, belief_file, level = "none";
   std::uint64_t seed = 0;
   SimulatedWorldOptions options;
-  wire::ParticipantOptions participant_options{.name = "jostle_sim"};
+  wire::ParticipantOptions participant_options{
+      .name = "jostle_sim", .role = wire::Role::kRobot, .waits_for_server = true};
   common::ProcessOptions process;
   app.add_option("scene", scene_file, "Scene file")->required();
   app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")

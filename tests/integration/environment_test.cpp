@@ -252,5 +252,21 @@ TEST_F(Surroundings, RoleThatIsNotEnoughIsExplainedBeforeAnythingElse) {
   EXPECT_THAT(sut->err() + sut->out(), Not(HasSubstr("\033[")));
 }
 
+TEST_F(Surroundings, ProtectedAndUnprotectedOnesAreToldOfEachOther) {
+  const std::string keys = folder.path() / "keys";
+  ASSERT_EQ(on(kHere, "jostle_keys", {"init", keys})->wait(kPatience), 0);
+  const auto worker = on(kHere, "jostle_worker", {});
+  ASSERT_TRUE(worker->says("rollouts at a time", kPatience)) << worker->err();
+
+  const auto protected_one = check(doctor({}, {"--secure", keys + "/identities/robot"}), "participant");
+  EXPECT_EQ(protected_one["verdict"], "warn");
+  EXPECT_THAT(protected_one["finding"].get<std::string>(), HasSubstr("is unprotected and this program is protected"));
+
+  const auto guarded = on(kHere, "jostle_worker", {"--secure", keys + "/identities/worker"});
+  ASSERT_TRUE(guarded->says("rollouts at a time", kPatience)) << guarded->err();
+  const auto unprotected_one = check(doctor(), "participant");
+  EXPECT_THAT(unprotected_one["finding"].get<std::string>(), HasSubstr("is protected and this program is unprotected"));
+}
+
 }  // namespace
 }  // namespace jostle::tests

@@ -5,12 +5,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <iterator>
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <thread>
 
 #include "services/common/process/environment.hpp"
 #include "services/common/process/nearest.hpp"
@@ -25,6 +27,7 @@ using common::environment;
 using common::NetworkChoice;
 
 constexpr const char* kUnset = "unset it";
+constexpr std::chrono::milliseconds kListening{1000};  // two announcements of those who are there
 
 // --- how processes find each other --------------------------------------------
 
@@ -223,7 +226,15 @@ std::vector<Check> check_joining(const wire::ParticipantOptions& options) {
   if (!participant_result)
     return {{"participant", Verdict::kFail, participant_result.error().message, "put that right first"}};
   auto checks = check_discovery_servers(*participant_result);
-  checks.push_back({"participant", Verdict::kOk, fmt::format("joins domain {}", participant_result->domain()), ""});
+  std::this_thread::sleep_for(kListening);
+  const std::string finding = fmt::format("joins domain {}, hears {} others", participant_result->domain(),
+                                          participant_result->others().size() - 1);  // we are one
+  const std::string apart = participant_result->who_is_apart();
+  if (apart.empty()) {
+    checks.push_back({"participant", Verdict::kOk, finding, ""});
+  } else {
+    checks.push_back({"participant", Verdict::kWarn, fmt::format("{}; {}", finding, apart), "the same for all"});
+  }
   return checks;
 }
 

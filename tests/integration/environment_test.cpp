@@ -230,9 +230,11 @@ TEST_F(SharedMemory, IsLeftOutWhereNobodyMayWrite) {
 // --- servers and roles --------------------------------------------------------
 
 TEST_F(Surroundings, ServerThatIsNotThereIsSaidWithinSeconds) {
-  const auto play = on(kHere, "jostle_play", {"--control", "status", "--discovery", "server:127.0.0.1:11899"});
-  EXPECT_EQ(play->wait(kPatience), 3);
-  EXPECT_THAT(play->err(), HasSubstr("no discovery server answered at 127.0.0.1:11899"));
+  const std::string scene = folder.path() / "scene.yaml";
+  ASSERT_EQ(on(kHere, "jostle_scene", {"generate", "--objects", "2", "-o", scene})->wait(kPatience), 0);
+  const auto run = on(kHere, "jostle_run", {scene, "--discovery", "server:127.0.0.1:11899"});
+  EXPECT_EQ(run->wait(kPatience), 3);
+  EXPECT_THAT(run->err(), HasSubstr("no discovery server answered at 127.0.0.1:11899"));
 
   const auto worker = on(kHere, "jostle_worker", {"--discovery", "server:127.0.0.1:11899"});
   EXPECT_TRUE(worker->says("no discovery server answered at 127.0.0.1:11899", kPatience));
@@ -245,10 +247,12 @@ TEST_F(Surroundings, RoleThatIsNotEnoughIsExplainedBeforeAnythingElse) {
   const std::string keys = folder.path() / "keys";
   ASSERT_EQ(on(kHere, "jostle_keys", {"init", keys})->wait(kPatience), 0);
 
-  const auto sut = on(kHere, "jostle_coordinator", {"--secure", keys + "/identities/worker"});
+  const std::string scene = folder.path() / "scene.yaml";
+  ASSERT_EQ(on(kHere, "jostle_scene", {"generate", "--objects", "2", "-o", scene})->wait(kPatience), 0);
+  const auto sut = on(kHere, "jostle_run", {scene, "--secure", keys + "/identities/worker"});
 
   EXPECT_EQ(sut->wait(kPatience), 2);
-  EXPECT_THAT(sut->err(), HasSubstr("identity 'worker' has role worker, jostle_coordinator needs robot"));
+  EXPECT_THAT(sut->err(), HasSubstr("identity 'worker' has role worker, `jostle run` needs robot"));
   EXPECT_THAT(sut->err() + sut->out(), Not(HasSubstr("\033[")));
 }
 

@@ -277,7 +277,8 @@ std::string option_entry(const CLI::Option& option) {
   for (const std::string& name : option.get_lnames()) names.push_back(fmt::format("\\fB\\-\\-{}\\fR", plain(name)));
   std::string entry = fmt::format(".TP\n{}", fmt::join(names, ", "));
   if (takes_value(option) && !option.get_positional()) entry += fmt::format(" \\fI{}\\fR", plain(value_name(option)));
-  entry += "\n" + paragraph(option.get_description());
+  const std::string meaning = option.get_description();
+  entry += "\n" + paragraph(meaning + (meaning.empty() || meaning.ends_with('.') ? "" : "."));
   if (!option.get_default_str().empty()) entry += fmt::format("Default: {}.\n", plain(option.get_default_str()));
   return entry;
 }

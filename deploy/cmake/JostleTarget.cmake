@@ -33,4 +33,5 @@ function(jostle_program name)
     set(ARG_COMPONENT jostle)
   endif()
   install(TARGETS jostle_${name} DESTINATION ${JOSTLE_PROGRAMS} COMPONENT ${ARG_COMPONENT})
+  set_property(GLOBAL APPEND PROPERTY JOSTLE_${ARG_COMPONENT}_PROGRAMS ${name})  # deploy/ makes their manual pages
 endfunction()

@@ -60,6 +60,12 @@ std::vector<const ControllerKind*>& catalogue() {
 
 std::span<const ControllerKind* const> controllers() { return catalogue(); }
 
+std::vector<std::string> controller_names() {
+  std::vector<std::string> names;
+  for (const ControllerKind* kind : catalogue()) names.emplace_back(kind->name);
+  return names;
+}
+
 std::string controller_help() {
   std::string text;
   for (const ControllerKind* kind : catalogue()) {

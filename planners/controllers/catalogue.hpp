@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "planners/control/controller.hpp"
 #include "planners/mpc/mpc.hpp"
@@ -38,6 +39,7 @@ std::span<const ControllerKind* const> controllers();
 
 /// Names and purposes on one line, for help texts.
 std::string controller_help();
+std::vector<std::string> controller_names();
 
 /// Finds a controller by its name, or the first that fits the scene where the name is empty.
 /// Error kInvalidArgument: "controller: got 'mpc' for a task to grasp, wanted or, nr".

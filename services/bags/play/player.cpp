@@ -332,8 +332,10 @@ Result<std::unique_ptr<Player>> Player::create(std::unique_ptr<BagReader> reader
   if (self.options.clock > 0) self.others->topics.insert(wire::topics::kClock.name);
   self.status.bag(reader->info().path.string());
 
-  auto participant_result =
-      wire::Participant::open({.name = "jostle_play", .domain = self.options.domain, .watch = watch_for(self.others)});
+  auto participant_result = wire::Participant::open({.name = "jostle_play",
+                                                     .domain = self.options.domain,
+                                                     .watch = watch_for(self.others),
+                                                     .role = wire::Role::kRobot});
   if (!participant_result) return participant_result.error();
   self.participant = *participant_result;
   self.publisher.emplace(*self.participant, plan.played);

@@ -37,7 +37,8 @@ bool is_done(const PlayStatus& status, const PlayControl& control) {
 
 Result<PlayStatus> control_remotely(const std::vector<Control>& controls, const RemoteOptions& options,
                                     std::stop_token stop) {
-  const auto participant_result = wire::Participant::open({.name = "jostle_play_control", .domain = options.domain});
+  const auto participant_result =
+      wire::Participant::open({.name = "jostle_play_control", .domain = options.domain, .role = wire::Role::kRobot});
   if (!participant_result) return participant_result.error();
   const int domain = participant_result->domain();
   wire::Writer<PlayControl> writer(*participant_result, wire::topics::kPlayControl);

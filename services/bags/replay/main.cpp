@@ -5,7 +5,9 @@
 #include <CLI/CLI.hpp>
 
 #include "physics_pool/local/thread_pool.hpp"
+#include "planners/controllers/catalogue.hpp"
 #include "services/bags/replay/report.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/cores.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/results/results.hpp"
@@ -74,7 +76,8 @@ int main(int argc, char** argv) {
   Arguments arguments;
   app.add_option("bag", arguments.bag, "Folder or file that `jostle run --record` or `jostle record` left")->required();
   app.add_option("--goal", arguments.goal, "Only this run of the bag (default: all)");
-  app.add_option("--controller", arguments.controller, "What if another had decided: or, nr, mpc");
+  common::suggest(app.add_option("--controller", arguments.controller, "What if another had decided: or, nr, mpc"),
+                  planners::controller_names());
   app.add_option(
          "--set", arguments.options.settings,
          "What if an option had been another, KEY=VALUE: predictor, seed, plan_only, or a key of the parameters\n"

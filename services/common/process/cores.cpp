@@ -10,9 +10,12 @@
 #include <sstream>
 
 #include "idl/types/number.hpp"
+#include "services/common/process/command_line.hpp"
 
 namespace jostle::common {
 namespace {
+
+constexpr int kMost = 1024;  // threads or processes
 
 // "2,3,6-8" of 2, 3, 6, 7 and 8.
 std::string ranges_of(const std::vector<int>& cores) {
@@ -104,15 +107,15 @@ Result<std::vector<int>> one_core_each(const std::vector<int>& cores, int thread
 
 CLI::Option* add_count_option(CLI::App& app, const std::string& name, int& count, int least, const std::string& help) {
   const CLI::Validator automatic(
-      [](std::string& text) {
+      [least](std::string& text) {
         if (text == "auto") text = std::to_string(usable_cores());
-        return std::string();
+        if (parse_whole(text, least, kMost)) return std::string();
+        return fmt::format("got '{}', wanted auto or {} to {}", text, least, kMost);
       },
       "");
-  return app.add_option(name, count, help)
-      ->transform(automatic)
-      ->check(CLI::Range(least, 1024).description(""))
-      ->type_name("N|auto");
+  auto* option = app.add_option(name, count, help)->transform(automatic)->type_name("N|auto");
+  suggest(option, {"auto"});
+  return option;
 }
 
 }  // namespace jostle::common

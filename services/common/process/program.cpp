@@ -11,6 +11,7 @@
 #include <cstdlib>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -18,7 +19,9 @@
 #include <utility>
 #include <vector>
 
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/domain.hpp"
+#include "services/common/process/environment.hpp"
 
 namespace jostle::common {
 namespace {
@@ -121,13 +124,17 @@ void add_network_options(CLI::App& app) {
   const auto sets = [](const char* variable) {
     return [variable](const std::string& text) { setenv(variable, text.c_str(), 1); };
   };
-  app.add_option_function<std::string>("--discovery", sets("JOSTLE_DISCOVERY"),
-                                       "How processes find each other: multicast, peers:HOST,HOST,... or\n"
-                                       "server:HOST[:PORT] (default: JOSTLE_DISCOVERY, else multicast)");
-  app.add_option_function<std::string>(
+  auto* discovery = app.add_option_function<std::string>(
+      "--discovery", sets("JOSTLE_DISCOVERY"),
+      "How processes find each other: multicast, peers:HOST,HOST,...,\n"
+      "server:HOST[:PORT] or localhost (default: JOSTLE_DISCOVERY, else what ROS 2's\n"
+      "variables say, else multicast)");
+  suggest(discovery, {"multicast", "peers:", "server:", "localhost"});
+  auto* space = app.add_option_function<std::string>(
       "--namespace", sets("JOSTLE_NAMESPACE"),
-      "Of the robot's topics, such as left: several robots then share a domain and its\n"
-      "workers (default: JOSTLE_NAMESPACE, else none)");
+      "ROS 2 namespace of the robot's topics, such as left: robots of different namespaces share\n"
+      "a domain and its workers (default: JOSTLE_NAMESPACE, else none)");
+  suggest(space, {});
   app.add_option_function<std::string>(
       "--secure", sets("JOSTLE_SECURE"),
       "Identity folder made by `jostle keys` (default: JOSTLE_SECURE, else unprotected)");
@@ -135,8 +142,13 @@ void add_network_options(CLI::App& app) {
 
 void add_process_options(CLI::App& app, ProcessOptions& options) {
   add_network_options(app);
+  add_domain_options(app, options);
+}
+
+void add_domain_options(CLI::App& app, ProcessOptions& options) {
   app.add_option("--domain", options.domain, "DDS domain (default: ROS_DOMAIN_ID, else 0)");
-  app.add_option("--die-with-parent", options.parent, "Process id of the starter: end when it ends");
+  // For our own programs: no help shows it.
+  app.add_option("--die-with-parent", options.parent, "Process id of the starter: end when it ends")->group("");
   app.parse_complete_callback([&options] {
     if (options.parent == 0) warn_of_ports(options.domain);  // else the parent has
   });
@@ -144,13 +156,62 @@ void add_process_options(CLI::App& app, ProcessOptions& options) {
 
 std::string participant_name(std::uint64_t id) { return fmt::format("participant {:016x}", id); }
 
+namespace {
+
+// What the launcher, the shell and the build ask of every program; no user does.
+std::optional<int> answer(const CLI::App& app, const std::vector<std::string>& words) {
+  if (words.empty()) return {};
+  const std::vector<std::string> rest(words.begin() + 1, words.end());
+  if (words[0] == "--help-of") {
+    const auto help_result = help_of(app, rest);
+    if (!help_result)
+      fmt::print(stderr, "{}\n", help_result.error().message);
+    else
+      fmt::print("{}", *help_result);
+    return help_result ? kExitOk : kExitUsage;
+  }
+  if (words[0] == "--complete") {
+    for (const std::string& line : completions(app, rest)) fmt::print("{}\n", line);
+    return kExitOk;
+  }
+  if (words[0] == "--man" && !rest.empty()) {
+    fmt::print("{}", manual_page(app, rest[0]));
+    return kExitOk;
+  }
+  return {};
+}
+
+// Whether what was asked for speaks DDS, and nobody else has told the user about the network.
+bool tells_of_network(const CLI::App& app) {
+  const auto* network = app.get_option_no_throw("--discovery");
+  const auto* parent = app.get_option_no_throw("--die-with-parent");
+  if (network && !(parent && parent->count() > 0)) return true;
+  const auto chosen = app.get_subcommands();
+  return std::ranges::any_of(chosen, [](const CLI::App* one) { return tells_of_network(*one); });
+}
+
+void tell_of_network(const CLI::App& app) {
+  const auto choice_result = choose_network();
+  if (!choice_result) return;  // whoever joins says so
+  for (const std::string& line : network_news(*choice_result)) fmt::print(stderr, "{}: {}\n", app.get_name(), line);
+}
+
+}  // namespace
+
 std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv) {
+  document_exit_codes(app);
+  if (const auto code = answer(app, {argv + 1, argv + argc})) return code;
   try {
     app.parse(argc, argv);
-    return {};
+  } catch (const CLI::Success& help) {
+    app.exit(help);
+    return kExitOk;
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kExitOk : kExitUsage;
+    fmt::print(stderr, "{}\n", explain(app, error));
+    return kExitUsage;
   }
+  if (tells_of_network(app)) tell_of_network(app);
+  return {};
 }
 
 void set_up_logging(const std::string& name) {

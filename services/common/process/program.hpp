@@ -66,13 +66,20 @@ struct ProcessOptions {
   pid_t parent = 0;           ///< see die_with_parent
 };
 void add_process_options(CLI::App& app, ProcessOptions& options);
+/// Adds what they can be told of the domain alone: for one that neither looks for others nor says anything.
+void add_domain_options(CLI::App& app, ProcessOptions& options);
 
 /// Writes "participant 00000000deadbeef": how a process says in its log who it is in a domain, for the one
 /// that started it. `id`: wire::Participant::id().
 std::string participant_name(std::uint64_t id);
 
-/// Parses the command line. Returns an exit code if the program is to end: after --help,
-/// or with kExitUsage after wrong arguments.
+/// Parses the command line. Returns an exit code if the program is to end: after --help, or with kExitUsage after wrong
+/// arguments, which it explains. Says in a line what in the environment decides how processes find each other, where a
+/// user may not expect it. Three first words are not for users and in no help:
+///
+///   --help-of [SUBCOMMAND…]   the help of a subcommand; for `jostle help`
+///   --complete WORD…          see completions(); for shells
+///   --man PURPOSE             see manual_page(); for the build
 std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv);
 
 /// Sends log lines to standard error, as "NAME: level: text".

@@ -64,7 +64,7 @@ Result<void> choose_cores(const std::string& list, bool threads_given, WorkerOpt
 int main(int argc, char** argv) {
   CLI::App app("Runs rollouts for any planner in the same DDS domain until it is told to end.", "jostle worker");
   WorkerOptions options;
-  wire::ParticipantOptions dds_options{.name = "jostle_worker"};
+  wire::ParticipantOptions dds_options{.name = "jostle_worker", .role = wire::Role::kWorker, .waits_for_server = true};
   common::ProcessOptions process;
   std::string pin;
   auto* threads = common::add_count_option(app, "--threads", options.threads, 1,

@@ -208,7 +208,8 @@ Result<void> bench_pool(const PoolTimelineOptions& options) {
   std::vector<pool::RemotePool*> pools{&(*swarm_result)->pool()};
   std::vector<std::uint64_t> ids{(*swarm_result)->participant().id()};
   for (int i = 1; i < options.clients; ++i) {
-    auto participant_result = wire::Participant::open({.name = "jostle_bench", .domain = options.domain});
+    auto participant_result =
+        wire::Participant::open({.name = "jostle_bench", .domain = options.domain, .role = wire::Role::kRobot});
     if (!participant_result) return participant_result.error();
     ids.push_back(participant_result->id());
     others.push_back(std::make_unique<Client>(*participant_result, pool_options));

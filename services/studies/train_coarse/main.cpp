@@ -63,8 +63,8 @@ int collect_data(Arguments& arguments, std::stop_token stop) {
   }
   // Enough to keep the queues of a few machines full.
   arguments.collect.in_flight = 64;
-  auto participant_result =
-      wire::Participant::open({.name = "jostle_train_coarse", .domain = arguments.process.domain});
+  auto participant_result = wire::Participant::open(
+      {.name = "jostle_train_coarse", .domain = arguments.process.domain, .role = wire::Role::kRobot});
   if (!participant_result) return fail(participant_result.error());
   try {
     pool::RemotePool pool(*participant_result);

@@ -16,7 +16,8 @@ int main(int argc, char** argv) {
   CLI::App app("Accepts a task, plans it with a pool of workers, executes it and reports.", "jostle coordinator");
   std::string pool_kind = "dds";
   int threads = common::usable_cores();
-  wire::ParticipantOptions participant_options{.name = "jostle_coordinator"};
+  wire::ParticipantOptions participant_options{
+      .name = "jostle_coordinator", .role = wire::Role::kRobot, .waits_for_server = true};
   common::ProcessOptions process;
   app.add_option("--pool", pool_kind, "dds: worker processes; threads: in this process")
       ->capture_default_str()

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "physics_pool/uncertainty/belief.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/program.hpp"
 #include "services/task/config/predictor.hpp"
 
@@ -10,16 +11,21 @@ namespace jostle::task {
 
 void add_goal_options(CLI::App& app, GoalArguments& arguments, RunOptions& options) {
   app.add_option("scene", arguments.scene, "Scene file; `jostle scene generate` makes one")->required();
-  app.add_option("--controller", options.controller,
-                 planners::controller_help() + " (default: the first that can do the task)");
-  app.add_option(
-         "--predictor", options.predictor,
-         "What plans of pushes are made with: fine, coarse[,MODEL], parareal:K[,MODEL][,split] or\n"
-         "parareal:adaptive[,MODEL][,split]; MODEL is kinematic, limit-surface, planar, learned or learned:FILE")
-      ->capture_default_str();
-  app.add_option("--uncertainty", arguments.level,
-                 "How wrong the planner's belief about the world is: none, low, medium or high")
-      ->capture_default_str();
+  auto* controller = app.add_option("--controller", options.controller,
+                                    planners::controller_help() + " (default: the first that can do the task)");
+  common::suggest(controller, planners::controller_names());
+  auto* predictor =
+      app.add_option(
+             "--predictor", options.predictor,
+             "What plans of pushes are made with: fine, coarse[,MODEL], parareal:K[,MODEL][,split] or\n"
+             "parareal:adaptive[,MODEL][,split]; MODEL is kinematic, limit-surface, planar, learned or learned:FILE")
+          ->capture_default_str();
+  common::suggest(predictor,
+                  {"fine", "coarse", "coarse,learned", "parareal:1", "parareal:1,learned", "parareal:adaptive"});
+  auto* uncertainty = app.add_option("--uncertainty", arguments.level,
+                                     "How wrong the planner's belief about the world is: none, low, medium or high")
+                          ->capture_default_str();
+  common::suggest(uncertainty, {"none", "low", "medium", "high"});
   app.add_option("--seed", options.seed, "Seed of all noise, the planner's and the world's")->capture_default_str();
   app.add_option("--parameters", arguments.parameters.file,
                  "Parameter file (YAML) of planner and controller; what it leaves out keeps its default.\n"

@@ -28,7 +28,8 @@ std::filesystem::path program(const char* name) { return common::program_folder(
 }  // namespace
 
 Result<std::unique_ptr<Session>> Session::start(const RunOptions& options, Watcher watcher) {
-  auto participant_result = wire::Participant::open({.name = "jostle_run", .domain = options.domain});
+  auto participant_result =
+      wire::Participant::open({.name = "jostle_run", .domain = options.domain, .role = wire::Role::kRobot});
   if (!participant_result) return participant_result.error();
   // Two that start at once would each hear the other's processes and take them for their own.
   auto claim_result = common::DomainClaim::take("run", participant_result->domain(), std::chrono::seconds(1),

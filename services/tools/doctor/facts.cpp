@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
 #include <utility>
 
 #include "idl/types/hash.hpp"
+#include "services/common/process/environment.hpp"
 #include "services/common/process/files.hpp"
 #include "services/wire/security/identity.hpp"
 
@@ -18,9 +18,10 @@ namespace {
 constexpr std::size_t kLargestPayload = 65'507;  // bytes of a UDP datagram over IPv4
 constexpr Verdict kVerdicts[] = {Verdict::kOk, Verdict::kWarn, Verdict::kFail};
 
-std::string environment(const char* variable, const char* otherwise) {
-  const char* text = std::getenv(variable);
-  return text && *text ? text : otherwise;
+// "" where what the environment says is malformed: no participant is made then.
+std::string discovery_text() {
+  const auto choice_result = common::choose_network();
+  return choice_result ? choice_result->discovery : "";
 }
 
 }  // namespace
@@ -32,9 +33,9 @@ Facts facts_of(int domain, std::vector<Check> checks) {
               .version = JOSTLE_VERSION,
               .types = JOSTLE_WIRE_TYPES,
               .domain = domain,
-              .discovery = environment("JOSTLE_DISCOVERY", "multicast"),
+              .discovery = discovery_text(),
               .checks = std::move(checks)};
-  const std::string folder = environment("JOSTLE_SECURE", "");
+  const std::string folder = common::environment("JOSTLE_SECURE");
   if (folder.empty()) return facts;
   // Good, or there would be no participant.
   const auto identity_result = wire::open_identity(folder);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "services/common/process/program.hpp"
+#include "services/tools/doctor/environment.hpp"
 #include "services/tools/doctor/facts.hpp"
 #include "services/tools/doctor/listen.hpp"
 #include "services/tools/doctor/machine.hpp"
@@ -22,13 +23,16 @@ namespace {
 struct Arguments {
   bool as_json = false, clean = false, listen = false;
   PeerOptions peer{.host = "", .port = kDoctorPort};
-  wire::ParticipantOptions participant{.name = "jostle_doctor", .domain = {}};
+  wire::ParticipantOptions participant{.name = "jostle_doctor", .domain = {}, .waits_for_server = true};
 };
 
 // This machine. Before any participant is made.
 std::vector<Check> examine(std::optional<int> domain) {
-  std::vector<Check> checks{check_shared_memory(), check_leftovers()};
-  std::ranges::copy(check_multicast(), std::back_inserter(checks));
+  std::vector<Check> checks = check_environment();
+  checks.push_back(check_addresses());
+  checks.push_back(check_shared_memory());
+  checks.push_back(check_leftovers());
+  if (finds_by_multicast()) std::ranges::copy(check_multicast(), std::back_inserter(checks));
   checks.push_back(check_profiles());
   checks.push_back(check_udp_buffers());
   checks.push_back(check_domain(domain));
@@ -73,8 +77,9 @@ int listen(const Arguments& arguments, std::stop_token stop) {
 
 int report(const Arguments& arguments) {
   std::vector<Check> checks = examine(arguments.participant.domain);
-  if (!arguments.peer.host.empty())
-    std::ranges::copy(check_peer(arguments.peer, arguments.participant), std::back_inserter(checks));
+  const auto joined = arguments.peer.host.empty() ? check_joining(arguments.participant)
+                                                  : check_peer(arguments.peer, arguments.participant);
+  std::ranges::copy(joined, std::back_inserter(checks));
   if (arguments.as_json) {
     fmt::print("{}\n", to_json(checks).dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   } else {

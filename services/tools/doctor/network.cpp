@@ -2,13 +2,16 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <ifaddrs.h>
+#include <net/if.h>
 #include <unistd.h>
 
 #include <fstream>
 #include <string>
 
 #include "services/common/process/domain.hpp"
+#include "services/common/process/environment.hpp"
 #include "services/tools/doctor/socket.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/profiles.hpp"
@@ -30,6 +33,29 @@ std::string interface_with(in_addr address) {
   }
   freeifaddrs(all);
   return name;
+}
+
+struct Addresses {
+  bool loopback = false;  // 127.0.0.1, of an interface that is up
+  bool has_ipv6 = false;  // beside the loopback
+  std::vector<std::string> others;
+};
+
+Addresses addresses() {
+  Addresses result;
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return result;
+  for (const ifaddrs* one = all; one; one = one->ifa_next) {
+    if (!one->ifa_addr || !(one->ifa_flags & IFF_UP)) continue;
+    const bool is_loopback = one->ifa_flags & IFF_LOOPBACK;
+    if (one->ifa_addr->sa_family == AF_INET6 && !is_loopback) result.has_ipv6 = true;
+    if (one->ifa_addr->sa_family != AF_INET) continue;
+    const std::string text = to_string(reinterpret_cast<const sockaddr_in*>(one->ifa_addr)->sin_addr);
+    if (text == "127.0.0.1") result.loopback = true;
+    if (!is_loopback) result.others.push_back(fmt::format("{} ({})", text, one->ifa_name));
+  }
+  freeifaddrs(all);
+  return result;
 }
 
 // Sends a datagram to the group through one interface and waits for it there.
@@ -59,6 +85,28 @@ Check check_interface(const std::string& name, in_addr address) {
 }
 
 }  // namespace
+
+Check check_addresses() {
+  const Addresses found = addresses();
+  const std::string name = "IPv4";
+  if (!found.loopback) {
+    return {name, Verdict::kFail,
+            fmt::format("no 127.0.0.1: processes of this machine do not hear each other{}",
+                        found.others.empty() ? "; no other IPv4 address either" : ""),
+            "ip link set lo up; ip address add 127.0.0.1/8 dev lo"};
+  }
+  if (!found.others.empty())
+    return {name, Verdict::kOk, fmt::format("127.0.0.1, {}", fmt::join(found.others, ", ")), ""};
+  return {name, Verdict::kWarn,
+          fmt::format("127.0.0.1 only{}: no other machine is reachable",
+                      found.has_ipv6 ? ", beside IPv6, which Jostle does not use" : ""),
+          "if there are others: an IPv4 address on their network, ip address add ADDRESS/24 dev INTERFACE"};
+}
+
+bool finds_by_multicast() {
+  const auto choice_result = common::choose_network();
+  return !choice_result || choice_result->discovery.starts_with("multicast");
+}
 
 std::vector<Check> check_multicast() {
   std::vector<Check> checks{check_interface("lo", {htonl(INADDR_LOOPBACK)})};

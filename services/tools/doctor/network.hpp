@@ -9,6 +9,12 @@
 
 namespace jostle::tools {
 
+/// Checks that this machine has IPv4 addresses, and how far they reach.
+Check check_addresses();
+
+/// Whether processes find each other by multicast here; by all else they need none.
+bool finds_by_multicast();
+
 /// Checks whether multicast has a route, and whether a datagram that is sent to the
 /// group of Fast DDS's discovery comes back, on the loopback and on the
 /// interface of the route. Sends for real, to a port of its own.

@@ -8,12 +8,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <thread>
 
 #include "idl/types/time.hpp"
 #include "services/common/charts/statistics.hpp"
 #include "services/common/process/domain.hpp"
+#include "services/common/process/environment.hpp"
 #include "services/tools/doctor/echo.hpp"
 #include "services/tools/doctor/facts.hpp"
 #include "services/tools/doctor/line.hpp"
@@ -223,6 +223,8 @@ std::string remedy_for_strangers(const Pair& pair, bool found) {
                          pair.both());
     case wire::Discovery::Mode::kPeers:
       return fmt::format("--discovery peers:{} on both; firewalls: UDP ports of the domain, see UDP", pair.both());
+    case wire::Discovery::Mode::kLocalhost:
+      return fmt::format("--discovery multicast, or peers:{}, on both: localhost hears nobody else", pair.both());
     case wire::Discovery::Mode::kServer:
       break;
   }
@@ -262,11 +264,12 @@ std::vector<Check> check_dds(const Pair& pair, const wire::Participant& particip
   if (!met) {
     const auto others = participant.others();
     const bool found = std::ranges::count(others, "jostle_doctor") > 1;  // we are one
-    return {
-        {"participants", Verdict::kFail,
-         fmt::format("{} in {} s", found ? "found each other, their topics did not match" : "did not find each other",
-                     kMeeting.count()),
-         remedy_for_strangers(pair, found)}};
+    const std::string apart = participant.who_is_apart();
+    return {{"participants", Verdict::kFail,
+             fmt::format("{} in {} s{}{}",
+                         found ? "found each other, their topics did not match" : "did not find each other",
+                         kMeeting.count(), apart.empty() ? "" : "; ", apart),
+             remedy_for_strangers(pair, found)}};
   }
   caller.settle(Clock::now() + kSettling);  // whether answers come at all is for the samples to say
   std::vector<Check> checks{{"participants", Verdict::kOk, fmt::format("found each other in {:.2f} s", took), ""}};
@@ -284,11 +287,6 @@ std::vector<Check> check_dds(const Pair& pair, const wire::Participant& particip
   return checks;
 }
 
-std::string environment(const char* variable, const char* otherwise) {
-  const char* text = std::getenv(variable);
-  return text && *text ? text : otherwise;
-}
-
 // Whether somebody refuses datagrams at that port: then no server is there.
 bool is_refused(const wire::Discovery::Host& host) {
   const Socket probe(SOCK_DGRAM);
@@ -301,10 +299,13 @@ bool is_refused(const wire::Discovery::Host& host) {
 }  // namespace
 
 std::vector<Check> check_discovery_servers(const wire::Participant& participant) {
-  const auto discovery = wire::parse_discovery(environment("JOSTLE_DISCOVERY", "multicast"));
+  const auto choice_result = common::choose_network();
+  if (!choice_result) return {};
+  const auto discovery = wire::parse_discovery(choice_result->discovery);
   if (!discovery || discovery->mode != wire::Discovery::Mode::kServer) return {};
   std::vector<Check> checks;
   for (const auto& host : discovery->hosts) {
+    if (host.address.empty()) continue;
     const std::string place = fmt::format("{}:{}", host.address, host.port);
     Check check{.name = "discovery server", .finding = place};
     if (is_refused(host)) {
@@ -364,7 +365,7 @@ std::vector<Check> examine(const PeerOptions& peer, const wire::ParticipantOptio
   const Pair pair{*line_result,
                   facts_of(participant_result->domain(), {}),
                   *theirs_result,
-                  wire::parse_discovery(environment("JOSTLE_DISCOVERY", "multicast")).value(),
+                  wire::parse_discovery(facts_of(participant_result->domain(), {}).discovery).value(),
                   peer.host,
                   there,
                   route_to(there).value_or(any_address())};

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
@@ -9,6 +10,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <ctime>
 #include <fstream>
 #include <map>
@@ -119,6 +121,18 @@ std::vector<Leftover> find_leftovers(const LeftoverSearch& search) {
   return leftovers;
 }
 
+std::vector<std::string> find_closed_ports(const fs::path& folder) {
+  std::vector<std::string> closed;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename();
+    if (name.find("fastrtps_port") == std::string::npos) continue;
+    if (access(entry.path().c_str(), R_OK | W_OK) != 0 && errno == EACCES) closed.push_back(name);
+  }
+  std::ranges::sort(closed);
+  return closed;
+}
+
 void remove_leftovers(const std::vector<Leftover>& leftovers) {
   std::error_code ignored;  // what stays is found again
   for (const Leftover& leftover : leftovers) {
@@ -130,11 +144,12 @@ Check check_shared_memory() {
   Check check{.name = "shared memory"};
   struct statvfs status {};
   if (statvfs(kFolder.c_str(), &status) != 0) {
-    return {check.name, Verdict::kFail, kFolder.string() + " is missing",
+    return {check.name, Verdict::kWarn, kFolder.string() + " is missing: UDP is used instead",
             "mount a tmpfs there: mount -t tmpfs tmpfs /dev/shm"};
   }
   if (access(kFolder.c_str(), W_OK) != 0) {
-    return {check.name, Verdict::kFail, kFolder.string() + " is not writable", "chmod 1777 /dev/shm"};
+    return {check.name, Verdict::kWarn, kFolder.string() + " is not writable: UDP is used instead",
+            "mount -o remount,rw /dev/shm; chmod 1777 /dev/shm"};
   }
   const double free = static_cast<double>(status.f_bavail) * static_cast<double>(status.f_frsize) / kMiB;
   check.finding = fmt::format("{}: {:.0f} MiB free", kFolder.string(), free);
@@ -149,6 +164,12 @@ Check check_shared_memory() {
 
 Check check_leftovers() {
   const std::vector<Leftover> leftovers = find_leftovers();
+  if (const auto closed = find_closed_ports(); !closed.empty()) {
+    return {"leftovers", Verdict::kWarn,
+            fmt::format("ports of another user: {}; in their domains this user's programs use UDP instead",
+                        fmt::join(closed, ", ")),
+            "if that user's programs have ended: sudo jostle doctor --clean"};
+  }
   if (leftovers.empty()) return {"leftovers", Verdict::kOk, "no shared memory of killed processes", ""};
   return {"leftovers", Verdict::kWarn,
           fmt::format("segments and ports of killed processes: {}, {:.1f} MiB", leftovers.size(), mebibytes(leftovers)),

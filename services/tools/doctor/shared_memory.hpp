@@ -33,6 +33,9 @@ struct LeftoverSearch {
 /// is whatever has not settled.
 std::vector<Leftover> find_leftovers(const LeftoverSearch& search = {});
 
+/// Looks for ports of shared memory that this user may not open: another user's, living or left behind.
+std::vector<std::string> find_closed_ports(const std::filesystem::path& folder = "/dev/shm");
+
 /// Removes the leftovers that it can remove.
 void remove_leftovers(const std::vector<Leftover>& leftovers);
 

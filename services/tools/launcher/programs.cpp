@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <string_view>
 #include <utility>
 
@@ -34,21 +33,6 @@ constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string
     {"workers", "list the workers of a domain, and whom they serve"},
 });
 
-// Levenshtein's distance, one row at a time.
-std::size_t edits(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row.back();
-}
-
 }  // namespace
 
 std::filesystem::path program_file(const std::filesystem::path& folder, const std::string& name) {
@@ -57,26 +41,25 @@ std::filesystem::path program_file(const std::filesystem::path& folder, const st
   return folder / file;
 }
 
-std::vector<Program> installed_programs(const std::filesystem::path& folder) {
+std::vector<Program> all_programs() {
   std::vector<Program> programs;
   for (const auto& [name, purpose] : kPurposes) {
-    if (access(program_file(folder, std::string(name)).c_str(), X_OK) != 0) continue;
     programs.push_back({.name = std::string(name), .purpose = std::string(purpose)});
   }
   return programs;
 }
 
-std::string nearest(const std::vector<Program>& programs, const std::string& name) {
-  // Every second letter wrong is no misspelling any more.
-  std::size_t fewest = name.size() / 2 + 1;
-  std::string found;
-  for (const Program& program : programs) {
-    const std::size_t needed = edits(name, program.name);
-    if (needed >= fewest) continue;
-    fewest = needed;
-    found = program.name;
-  }
-  return found;
+std::vector<Program> installed_programs(const std::filesystem::path& folder) {
+  std::vector<Program> programs = all_programs();
+  std::erase_if(programs,
+                [&](const Program& one) { return access(program_file(folder, one.name).c_str(), X_OK) != 0; });
+  return programs;
+}
+
+std::vector<std::string> names_of(const std::vector<Program>& programs) {
+  std::vector<std::string> names;
+  for (const Program& program : programs) names.push_back(program.name);
+  return names;
 }
 
 }  // namespace jostle::tools

@@ -21,7 +21,9 @@ std::filesystem::path program_file(const std::filesystem::path& folder, const st
 /// jostle_… (tests, a user's own) can be run, yet are not listed.
 std::vector<Program> installed_programs(const std::filesystem::path& folder);
 
-/// Finds the program whose name takes the fewest edits to reach; "" when none is near.
-std::string nearest(const std::vector<Program>& programs, const std::string& name);
+/// Lists all of Jostle's programs, whatever of them is installed.
+std::vector<Program> all_programs();
+
+std::vector<std::string> names_of(const std::vector<Program>& programs);
 
 }  // namespace jostle::tools

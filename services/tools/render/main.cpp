@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/terminal/progress_line.hpp"
 #include "services/tools/render/bag_frames.hpp"
@@ -72,7 +73,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
   app.add_option("--size", arguments.size, "WxH of each picture, pixels")->capture_default_str();
-  app.add_option("--camera", arguments.draw.picture.camera, "overview or top")->capture_default_str();
+  common::suggest(app.add_option("--camera", arguments.draw.picture.camera, "overview or top")->capture_default_str(),
+                  {"overview", "top"});
   app.add_option("--fps", arguments.draw.per_second, "of a film or folder: pictures per second")
       ->check(CLI::Range(0.1, 120.0))
       ->capture_default_str();
@@ -85,7 +87,7 @@ int main(int argc, char** argv) {
   app.add_option("--clock", arguments.clock, "of a bag: world, which may stand still while a plan is made, or wall")
       ->check(CLI::IsMember({"world", "wall"}))
       ->capture_default_str();
-  app.add_option("--goal", arguments.bag.goal, "of a bag with several runs: which");
+  app.add_option("--goal", arguments.bag.goal, "goal id of the run to draw, where a bag has several");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   if (!parse_size(arguments.size, arguments.draw.picture)) {
     fmt::print(stderr, "jostle render: --size: got '{}', wanted WxH such as 640x480\n", arguments.size);

@@ -43,6 +43,9 @@ class Participant::Core {
   eprosima::fastdds::dds::Topic* acquire_topic(const std::string& name, eprosima::fastdds::dds::TypeSupport type);
   void release_topic(eprosima::fastdds::dds::Topic* topic);
 
+  /// See Participant::who_is_apart().
+  std::string who_is_apart() const;
+
   eprosima::fastdds::dds::DomainParticipant* const participant;
   eprosima::fastdds::dds::Publisher* const publisher;
   eprosima::fastdds::dds::Subscriber* const subscriber;
@@ -53,7 +56,7 @@ class Participant::Core {
  private:
   std::mutex mutex_;  // guards users_ and the creation of topics
   std::map<std::string, int> users_;
-  const std::shared_ptr<eprosima::fastdds::dds::DomainParticipantListener> listener_;  // the participant calls it
+  const std::shared_ptr<Doorkeeper> listener_;  // the participant calls it
 };
 
 /// Who is at the other end of a writer or reader: the endpoints that the middleware matched

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <netdb.h>
 
+#include <algorithm>
+#include <optional>
 #include <ranges>
 #include <string_view>
 
@@ -15,7 +17,15 @@ namespace {
 Error malformed(const std::string& text, const std::string& why) {
   return {
       Code::kInvalidArgument,
-      fmt::format("discovery: got '{}', wanted multicast, peers:HOST[,HOST...] or server:HOST[:PORT]: {}", text, why)};
+      fmt::format("discovery: got '{}', wanted multicast, peers:HOST[,HOST...], server:HOST[:PORT] or localhost: {}",
+                  text, why)};
+}
+
+std::optional<Discovery::Mode> mode_of(std::string_view word) {
+  if (word == "multicast+peers") return Discovery::Mode::kMulticast;
+  if (word == "peers") return Discovery::Mode::kPeers;
+  if (word == "server") return Discovery::Mode::kServer;
+  return {};
 }
 
 }  // namespace
@@ -36,13 +46,18 @@ Result<std::string> resolve(const std::string& host) {
 
 Result<Discovery> parse_discovery(const std::string& text) {
   if (text == "multicast") return Discovery{};
+  if (text == "localhost") return Discovery{.mode = Discovery::Mode::kLocalhost};
   const std::size_t colon = text.find(':');
-  const std::string_view word = std::string_view(text).substr(0, colon);
-  if (colon == std::string::npos || (word != "peers" && word != "server")) return malformed(text, "no such way");
-  Discovery discovery{.mode = word == "peers" ? Discovery::Mode::kPeers : Discovery::Mode::kServer};
+  const auto mode = colon == std::string::npos ? std::nullopt : mode_of(std::string_view(text).substr(0, colon));
+  if (!mode) return malformed(text, "no such way");
+  Discovery discovery{.mode = *mode};
   const bool with_port = discovery.mode == Discovery::Mode::kServer;
   for (const auto part : std::string_view(text).substr(colon + 1) | std::views::split(',')) {
     std::string host(part.begin(), part.end());
+    if (with_port && host.empty()) {
+      discovery.hosts.push_back({});
+      continue;
+    }
     std::uint16_t port = with_port ? kServerPort : std::uint16_t{0};
     if (const std::size_t at = host.find(':'); at != std::string::npos) {
       if (!with_port) return malformed(text, fmt::format("'{}' has a port; peers need none", host));
@@ -56,7 +71,8 @@ Result<Discovery> parse_discovery(const std::string& text) {
     if (!address_result) return Error{address_result.error().code, "discovery: " + address_result.error().message};
     discovery.hosts.push_back({.address = std::move(address_result).value(), .port = port});
   }
-  if (discovery.hosts.empty()) return malformed(text, "a host is empty");
+  if (std::ranges::all_of(discovery.hosts, &std::string::empty, &Discovery::Host::address))
+    return malformed(text, "a host is empty");
   return discovery;
 }
 

@@ -15,12 +15,13 @@ inline constexpr std::uint16_t kServerPort = 11811;
 
 struct Discovery {
   enum class Mode {
-    kMulticast,  ///< everybody on a network that passes multicast
+    kMulticast,  ///< everybody on a network that passes multicast, and the hosts listed
     kPeers,      ///< the hosts listed, each listing the others; this host always
     kServer,     ///< through discovery servers, which introduce processes and carry no data
+    kLocalhost,  ///< this host, and nobody else
   };
   struct Host {
-    std::string address;     ///< IPv4
+    std::string address;     ///< IPv4; empty where a list of servers leaves a place out
     std::uint16_t port = 0;  ///< that of a server
     bool operator==(const Host&) const = default;
   };
@@ -35,8 +36,10 @@ Result<std::string> resolve(const std::string& host);
 /// Reads
 ///
 ///   multicast
+///   multicast+peers:HOST[,HOST…]
 ///   peers:HOST[,HOST…]
-///   server:HOST[:PORT][,HOST[:PORT]…]   the n-th is the one with --id n, from 0
+///   server:HOST[:PORT][,HOST[:PORT]…]   the n-th is the one with --id n, from 0; a place may be empty
+///   localhost
 ///
 /// HOST is an IPv4 address or a name that resolves to one; names are looked up here.
 /// Errors   kInvalidArgument  not of this form

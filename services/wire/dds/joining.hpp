@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <memory>
 
 #include "services/wire/dds/directory.hpp"
@@ -11,12 +12,23 @@
 
 namespace jostle::wire {
 
+/// Hears of other participants.
+class Doorkeeper : public eprosima::fastdds::dds::DomainParticipantListener {
+ public:
+  /// Returns how many there are that this participant does not talk to: unprotected ones if it is protected, else
+  /// protected ones. Threads: any.
+  virtual int apart() const = 0;
+};
+
 /// A participant, with the listener that must outlive it, and what it hears.
 struct Joined {
-  std::shared_ptr<eprosima::fastdds::dds::DomainParticipantListener> listener;
+  std::shared_ptr<Doorkeeper> listener;
   std::shared_ptr<const Directory> directory;
   eprosima::fastdds::dds::DomainParticipant* participant = nullptr;  ///< null: the middleware refused
 };
+
+/// Whether a participant of this QoS has an identity.
+bool is_protected(const eprosima::fastdds::dds::DomainParticipantQos& qos);
 
 /// Creates a participant that `watch` (may be empty) hears from. A protected one has
 /// authenticated with everybody who answers when this returns: after kHail where all is well.

@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -12,19 +13,23 @@
 #include <fastrtps/utils/IPLocator.h>
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <thread>
 #include <typeinfo>
 
 #include "idl/types/hash.hpp"
 #include "services/common/process/domain.hpp"
+#include "services/common/process/environment.hpp"
 #include "services/wire/dds/core.hpp"
 #include "services/wire/dds/directory.hpp"
 #include "services/wire/dds/endpoint_watch.hpp"
-#include "services/wire/dds/guard.hpp"
+#include "services/wire/dds/log.hpp"
 #include "services/wire/dds/profiles.hpp"
 #include "services/wire/dds/security.hpp"
+#include "services/wire/dds/transports.hpp"
 
 namespace jostle::wire {
 namespace {
@@ -42,19 +47,22 @@ constexpr std::uint32_t kPeersPerHost = 64;
 // Processes per host and domain: each looks for a free pair of ports. The middleware's default is
 // 100; one more comes up deaf, without a word.
 constexpr std::uint32_t kMostPerHost = 1000;
+constexpr std::chrono::seconds kServerAnswer{5};    // it takes some 100 ms where it is there
+constexpr std::chrono::seconds kServerGreeting{1};  // for who can wait: it says so, and goes on
+constexpr std::chrono::milliseconds kGlance{10};
+constexpr const char* kGroup = "239.255.0.1";  // RTPS 2.2, 9.6.1.4
 // Bytes; several samples of 1 MiB, whose p99 was 5 ms, and 39 ms with the middleware's 512 KiB.
 constexpr std::uint32_t kSegment = 8 << 20;
 
-std::string environment(const char* variable) {
-  const char* text = std::getenv(variable);
-  return text ? text : "";
-}
+using common::environment;
 
 // Once per process: the middleware keeps profiles in one place.
 Result<void> load_profiles_once() {
   static const Result<void> result = [] {
     DomainParticipantFactory::get_instance()->load_profiles();  // its own: FASTRTPS_DEFAULT_PROFILES_FILE
-    return load_profiles(profiles_file());
+    auto loaded = load_profiles(profiles_file());
+    log_in_plain_lines();
+    return loaded;
   }();
   return result;
 }
@@ -89,22 +97,42 @@ eprosima::fastrtps::rtps::Locator_t locator(const std::string& address, std::uin
   return result;
 }
 
-void find_by(const Discovery& discovery, DomainParticipantQos& qos) {
+void find_by(const Discovery& discovery, const common::NetworkChoice& choice, DomainParticipantQos& qos) {
   using eprosima::fastrtps::rtps::DiscoveryProtocol_t;
   auto& builtin = qos.wire_protocol().builtin;
-  if (discovery.mode == Discovery::Mode::kPeers) {
+  const bool lists = discovery.mode == Discovery::Mode::kPeers || discovery.mode == Discovery::Mode::kLocalhost ||
+                     (discovery.mode == Discovery::Mode::kMulticast && !discovery.hosts.empty());
+  if (lists) {
     builtin.initialPeersList.push_back(locator("127.0.0.1", 0));  // the other processes of this host
     for (const Discovery::Host& host : discovery.hosts) builtin.initialPeersList.push_back(locator(host.address, 0));
+    if (discovery.mode == Discovery::Mode::kMulticast) builtin.initialPeersList.push_back(locator(kGroup, 0));
   }
+  // An address for discovery, any one, without which the middleware would take the group's as well.
+  if (!choice.joins_group) builtin.metatrafficUnicastLocatorList.push_back(locator("0.0.0.0", 0));
   if (discovery.mode == Discovery::Mode::kServer) {
-    builtin.discovery_config.discoveryProtocol = DiscoveryProtocol_t::CLIENT;
+    builtin.discovery_config.discoveryProtocol =
+        choice.super_client ? DiscoveryProtocol_t::SUPER_CLIENT : DiscoveryProtocol_t::CLIENT;
     for (std::size_t i = 0; i < discovery.hosts.size(); ++i) {
+      if (discovery.hosts[i].address.empty()) continue;
       eprosima::fastdds::rtps::RemoteServerAttributes server;
       eprosima::fastdds::rtps::get_server_client_default_guidPrefix(static_cast<int>(i), server.guidPrefix);
       server.metatrafficUnicastLocatorList.push_back(locator(discovery.hosts[i].address, discovery.hosts[i].port));
       builtin.discovery_config.m_DiscoveryServers.push_back(server);
     }
   }
+  if (choice.only_this_machine) keep_on_this_machine(qos);
+}
+
+// How a server itself finds others is its own affair: whoever knows it comes.
+Result<common::NetworkChoice> choose_way(bool is_server) {
+  if (is_server) return common::NetworkChoice{};
+  return common::choose_network();
+}
+
+Result<Discovery> parse_way(const common::NetworkChoice& choice) {
+  auto discovery_result = parse_discovery(choice.discovery);
+  if (discovery_result || !choice.origin.starts_with("ROS_")) return discovery_result;
+  return Error{discovery_result.error().code, fmt::format("{}: {}", choice.origin, discovery_result.error().message)};
 }
 
 // Why a UDP socket cannot be bound there; empty if it can. `shares`: with others that share, too.
@@ -142,6 +170,28 @@ Result<void> check_multicast_port(int domain, const DomainParticipantQos& qos) {
           "DDS domain {}: another program has its UDP port of discovery, {}: {}; wanted it free: end that program "
           "(`ss -ulpn`), or choose a ROS_DOMAIN_ID whose ports nobody is given, 0 to 100",
           domain, port, problem)};
+}
+
+// A client hears of the server before anybody else, and of others from it.
+Result<void> await_server(const DomainParticipant& participant, const Discovery& discovery,
+                          const common::NetworkChoice& choice, std::chrono::seconds patience) {
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (participant.get_participant_names().size() < 2) {  // we are one
+    if (std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::sleep_for(kGlance);
+      continue;
+    }
+    std::vector<std::string> places;
+    for (const Discovery::Host& host : discovery.hosts) {
+      if (!host.address.empty()) places.push_back(fmt::format("{}:{}", host.address, host.port));
+    }
+    return Error{Code::kUnavailable,
+                 fmt::format("{}: no discovery server answered at {} within {} s; remedy: start `jostle "
+                             "discovery-server` there, on the same DDS domain; let firewalls pass that UDP port; "
+                             "`jostle doctor` tries it",
+                             choice.origin, fmt::join(places, ", "), patience.count())};
+  }
+  return {};
 }
 
 void serve(const ServerOptions& server, DomainParticipantQos& qos) {
@@ -226,11 +276,13 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
   DomainParticipantQos& qos = *qos_result;
   const auto space_result = parse_namespace(environment("JOSTLE_NAMESPACE"));
   if (!space_result) return space_result.error();
-  const std::string way = environment("JOSTLE_DISCOVERY"),
-                    identity = options.identity.value_or(environment("JOSTLE_SECURE"));
-  auto discovery_result = parse_discovery(way.empty() || server ? "multicast" : way);
+  const std::string identity = options.identity.value_or(environment("JOSTLE_SECURE"));
+  const auto choice_result = choose_way(server != nullptr);
+  if (!choice_result) return choice_result.error();
+  const auto discovery_result = parse_way(*choice_result);
   if (!discovery_result) return discovery_result.error();
-  find_by(*discovery_result, qos);
+  find_by(*discovery_result, *choice_result, qos);
+  if (auto ok = check_addresses(qos); !ok) return ok.error();
   if (discovery_result->mode == Discovery::Mode::kMulticast && !server) {
     if (auto ok = check_multicast_port(*domain_result, qos); !ok) return ok.error();
   }
@@ -244,17 +296,23 @@ Result<Participant> Participant::create(const ParticipantOptions& options, const
                    "a discovery server on a protected domain: the middleware has none that works; "
                    "wanted --discovery multicast or peers:HOST,..., or no --secure (JOSTLE_SECURE)"};
     }
-    if (auto ok = secure(qos, identity); !ok) return ok.error();
+    if (auto ok = secure(qos, identity, options.role); !ok) return ok.error();
   }
   introduce(qos);
-  guard(qos);
   Joined joined = join(*domain_result, qos, options.watch);
   if (!joined.participant) {
     return Error{Code::kUnavailable, fmt::format("DDS domain {}: no participant could be created; check the network "
                                                  "interfaces, /dev/shm and the profiles in '{}'",
                                                  *domain_result, profiles_file().path.string())};
   }
-  return Participant(std::make_shared<Core>(std::move(joined), *domain_result, *space_result));
+  Participant participant(std::make_shared<Core>(std::move(joined), *domain_result, *space_result));
+  if (discovery_result->mode == Discovery::Mode::kServer) {
+    const auto patience = options.waits_for_server ? kServerGreeting : kServerAnswer;
+    auto ok = await_server(*participant.core_->participant, *discovery_result, *choice_result, patience);
+    if (!ok && !options.waits_for_server) return ok.error();
+    if (!ok) fmt::print(stderr, "warning: {}; waiting for it\n", ok.error().message);
+  }
+  return participant;
 }
 
 int Participant::domain() const { return core_->domain; }
@@ -271,6 +329,19 @@ std::vector<std::string> profiles_for(const Participant::Core& core, const std::
   if (topic.starts_with(inside)) names.push_back("rt/" + topic.substr(inside.size()));
   names.emplace_back(qos.kind);
   return names;
+}
+
+std::string Participant::who_is_apart() const { return core_->who_is_apart(); }
+
+std::string Participant::Core::who_is_apart() const {
+  const int count = listener_->apart();
+  if (count == 0) return "";
+  const bool ours = is_protected(participant->get_qos());
+  return fmt::format(
+      "{} of domain {} {} {} and this program is {}: they do not hear each other; give both --secure, or "
+      "neither",
+      count == 1 ? "a participant" : fmt::format("{} participants", count), domain, count == 1 ? "is" : "are",
+      ours ? "unprotected" : "protected", ours ? "protected" : "unprotected");
 }
 
 std::uint64_t Participant::id() const { return participant_id(core_->participant->guid()); }

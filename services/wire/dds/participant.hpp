@@ -12,6 +12,7 @@
 #include "idl/types/result.hpp"
 #include "services/wire/dds/discovery.hpp"
 #include "services/wire/dds/names.hpp"
+#include "services/wire/security/role.hpp"
 
 namespace jostle::wire {
 
@@ -31,6 +32,8 @@ struct ParticipantOptions {
   std::optional<int> domain;             ///< 0 to 232; else ROS_DOMAIN_ID, else 0
   std::shared_ptr<EndpointWatch> watch;  ///< hears of all others from the first moment; may be empty
   std::optional<std::string> identity;   ///< its folder; "": unprotected; not given: JOSTLE_SECURE
+  std::optional<Role> role;              ///< that an identity must have for this program to do its work
+  bool waits_for_server = false;         ///< whether a discovery server may come later; else one must answer
 };
 
 /// What a participant says of itself.
@@ -57,7 +60,7 @@ struct ServerOptions {
 /// The rest comes from the environment, which the programs this one starts inherit; programs
 /// set the first three by the options --discovery, --secure and --namespace:
 ///
-///   JOSTLE_DISCOVERY      see parse_discovery(); else multicast
+///   JOSTLE_DISCOVERY      see parse_discovery(); else what ROS 2's variables say, see common::choose_network()
 ///   JOSTLE_SECURE         identity folder, see open_identity(); else unprotected
 ///   JOSTLE_NAMESPACE      see parse_namespace(); else none
 ///   JOSTLE_PROFILES       file of transports and QoS, see profiles_file()
@@ -66,15 +69,17 @@ struct ServerOptions {
 ///                         and the default where that is set; else udp
 ///
 /// UDP everywhere is as fast as shared memory for messages up to 64 KiB, and a killed process
-/// leaves nothing behind: over shared memory each leaves its segment, and its successor was
-/// found after 2.7 to 4.6 s instead of 0.7 to 1.0 s.
+/// leaves nothing behind. Where shared memory is wanted and /dev/shm has no room for it, or cannot be used, the
+/// participant has UDP alone, and a warning on standard error says so. Over shared memory each leaves its segment, and
+/// its successor was found after 2.7 to 4.6 s instead of 0.7 to 1.0 s.
 ///
 /// Threads  safe from any thread.
 class Participant {
  public:
-  /// Errors   kInvalidArgument  domain, transport, discovery, namespace, profiles or identity; says where it came from
+  /// Errors   kInvalidArgument  domain, transport, discovery, namespace, profiles, identity or its role; says where it
+  ///                            came from
   ///          kNotFound, kIo    a host, a file of the identity
-  ///          kUnavailable      the middleware refused
+  ///          kUnavailable      no IPv4 address, no answer of a discovery server, or the middleware refused
   static Result<Participant> open(const ParticipantOptions& options);
 
   /// Opens a participant that is a discovery server. Unprotected only: on a protected domain the
@@ -97,6 +102,10 @@ class Participant {
 
   /// Returns names of the participants found so far, as ParticipantOptions::name has them; ours is among them.
   std::vector<std::string> others() const;
+
+  /// Says that there are participants in the domain which do not hear this one, as they are protected and it is not, or
+  /// the other way round; "" if there are none. A part of a sentence, for messages about somebody who is missing.
+  std::string who_is_apart() const;
 
   class Core;
   Core& core() const { return *core_; }

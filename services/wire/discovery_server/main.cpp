@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   app.add_option("--id", server.id, "Its place, from 0, in the list of servers that the others are given")
       ->capture_default_str()
       ->check(CLI::Range(0, 255));
-  common::add_process_options(app, process);
+  common::add_domain_options(app, process);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   common::die_with_parent(process.parent);
   const common::StopSignal signal;

@@ -21,6 +21,8 @@ Rights rights_of(Role role) {
   return {};
 }
 
+bool covers(Role role, Role needed) { return role == Role::kRobot || role == needed; }
+
 std::string to_string(Role role) {
   switch (role) {
     case Role::kRobot:

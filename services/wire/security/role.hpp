@@ -26,6 +26,9 @@ struct Rights {
 
 Rights rights_of(Role role);
 
+/// Whether a holder of `role` may do all that `needed` asks for.
+bool covers(Role role, Role needed);
+
 /// Returns "robot", "worker", "observer" or "server".
 std::string to_string(Role role);
 std::optional<Role> parse_role(std::string_view word);

@@ -8,6 +8,7 @@
 
 #include "physics_pool/uncertainty/belief.hpp"
 #include "physics_pool/uncertainty/levels.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/domain_claim.hpp"
 #include "services/common/process/program.hpp"
 #include "services/world/link/simulated_world.hpp"
@@ -19,11 +20,14 @@ int main(int argc, char** argv) {
   std::string scene_file, belief_file, level = "none";
   std::uint64_t seed = 0;
   SimulatedWorldOptions options;
-  wire::ParticipantOptions participant_options{.name = "jostle_sim"};
+  wire::ParticipantOptions participant_options{
+      .name = "jostle_sim", .role = wire::Role::kRobot, .waits_for_server = true};
   common::ProcessOptions process;
   app.add_option("scene", scene_file, "Scene file")->required();
-  app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")
-      ->capture_default_str();
+  auto* uncertainty =
+      app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")
+          ->capture_default_str();
+  common::suggest(uncertainty, {"none", "low", "medium", "high"});
   app.add_option("--seed", seed, "Of the noise")->capture_default_str();
   app.add_option("--belief", belief_file,
                  "The planner's scene: where its objects are is what is measured first (default: drawn as\n"

@@ -30,6 +30,21 @@ TEST(Discovery, IsThroughServersWithThePortOfRos2UnlessGiven) {
   EXPECT_THAT(sut.hosts, ElementsAre(Host{"10.0.0.1", 11811}, Host{"10.0.0.2", 7777}));
 }
 
+TEST(Discovery, IsByMulticastAndPeersBeyondIt) {
+  const auto sut = parse_discovery("multicast+peers:10.0.0.2").value();
+
+  EXPECT_EQ(sut.mode, Discovery::Mode::kMulticast);
+  EXPECT_THAT(sut.hosts, ElementsAre(Host{"10.0.0.2", 0}));
+}
+
+TEST(Discovery, MayStayOnThisHost) {
+  EXPECT_EQ(parse_discovery("localhost").value().mode, Discovery::Mode::kLocalhost);
+}
+
+TEST(Discovery, LeavesPlacesOfServersEmpty) {
+  EXPECT_THAT(parse_discovery("server:,10.0.0.1").value().hosts, ElementsAre(Host{}, Host{"10.0.0.1", 11811}));
+}
+
 TEST(Discovery, LooksNamesUp) {
   EXPECT_THAT(parse_discovery("peers:localhost").value().hosts, ElementsAre(Host{"127.0.0.1", 0}));
 }
@@ -56,6 +71,8 @@ INSTANTIATE_TEST_SUITE_P(, BadDiscovery,
                                            std::pair("server:10.0.0.1:70000", "no port from 1 to 65535"),
                                            std::pair("server:10.0.0.1:x", "no port from 1 to 65535"),
                                            std::pair("server::11811", "a host is empty"),
+                                           std::pair("server:,", "a host is empty"),
+                                           std::pair("multicast+peers:", "a host is empty"),
                                            std::pair("peers:10.0.0.256", "host '10.0.0.256'")));
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "idl/files/files.hpp"
 #include "idl/types/qos.hpp"
 #include "services/common/process/files.hpp"
 
@@ -78,6 +79,8 @@ std::string name_of(const XMLElement& profile) {
 }
 
 constexpr const char* kNumber = "a whole number";
+constexpr std::size_t kMostBytes = std::size_t{256} << 10;  // thirty times what comes along
+constexpr int kMostAttempts = 500;                          // at finding what a file is refused for
 
 std::string got_in(const XMLElement& place) {
   return place.NoChildren() ? "nothing" : fmt::format("'{}'", text_of(place));
@@ -104,12 +107,13 @@ std::string complaint_about(XMLDocument& document, Complaints& complaints) {
 // the complaint stays; without it there is another one, or none. What follows it is lost.
 XMLElement& at_fault(XMLDocument& document, const std::string& complaint, Complaints& complaints) {
   XMLElement* place = document.RootElement();
+  int attempts = 0;
   for (;;) {
     XMLElement* removed = nullptr;
     XMLElement* aside = document.NewElement("aside");  // the document's, yet not in it
     do {
       removed = place->LastChildElement();
-      if (!removed) return *place;
+      if (!removed || ++attempts > kMostAttempts) return *place;
       aside->InsertEndChild(removed);
     } while (complaint_about(document, complaints) == complaint);
     place->InsertEndChild(removed);
@@ -262,13 +266,10 @@ ProfilesFile profiles_file() {
 Result<void> load_profiles(const ProfilesFile& file) {
   XMLProfileManager::DeleteInstance();
   if (file.path.empty()) return {};
+  const auto text_result = files::read(file.path, kMostBytes);
+  if (!text_result) return Error{text_result.error().code, text_result.error().message + "; wanted a file of profiles"};
   XMLDocument document;
-  if (const auto problem = document.LoadFile(file.path.c_str()); problem != tinyxml2::XML_SUCCESS) {
-    using namespace tinyxml2;
-    if (problem == XML_ERROR_FILE_NOT_FOUND || problem == XML_ERROR_FILE_COULD_NOT_BE_OPENED ||
-        problem == XML_ERROR_FILE_READ_ERROR) {
-      return Error{Code::kIo, fmt::format("{}: cannot be read; wanted a file of profiles", file.path.string())};
-    }
+  if (document.Parse(text_result->data(), text_result->size()) != tinyxml2::XML_SUCCESS) {
     return Error{Code::kInvalidArgument, fmt::format("{}:{}: got {}, wanted well-formed XML", file.path.string(),
                                                      document.ErrorLineNum(), document.ErrorName())};
   }

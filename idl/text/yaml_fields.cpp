@@ -37,6 +37,33 @@ std::string size_trouble(const YAML::Node& node, int depth, int& left) {
   return trouble;
 }
 
+// How many bytes the character in front has; 0 if it is none of UTF-8 (RFC 3629).
+std::size_t character_size(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
+  const unsigned first = byte(0), second = byte(1);
+  if (first < 0x80) return 1;
+  const std::size_t size = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
+  const unsigned least = first == 0xE0 ? 0xA0 : first == 0xF0 ? 0x90 : 0x80;  // else a shorter form would do
+  const unsigned most = first == 0xED ? 0x9F : first == 0xF4 ? 0x8F : 0xBF;   // surrogates; beyond Unicode
+  if (first < 0xC2 || first > 0xF4 || second < least || second > most) return 0;
+  for (std::size_t i = 2; i < size; ++i) {
+    if (byte(i) < 0x80 || byte(i) > 0xBF) return 0;
+  }
+  return size;
+}
+
+// The line from 1 of the first byte that is no UTF-8; 0 if all are. Names end up in JSON, which has nothing else.
+int line_without_utf8(std::string_view text) {
+  int line = 1;
+  while (!text.empty()) {
+    const std::size_t size = character_size(text);
+    if (size == 0) return line;
+    line += text.front() == '\n' ? 1 : 0;
+    text.remove_prefix(size);
+  }
+  return 0;
+}
+
 // The first line from 1 that is indented with a tab; 0 if none is.
 int line_with_tab(std::string_view text) {
   int line = 0;
@@ -213,6 +240,8 @@ Result<YAML::Node> load(std::string_view text, const std::string& origin) {
   };
   if (text.size() > files::kMostText)
     return refused(fmt::format("got {} bytes, wanted at most {}", text.size(), files::kMostText));
+  if (const int line = line_without_utf8(text); line > 0)
+    return Error{Code::kInvalidArgument, fmt::format("{}:{}: got bytes that are no UTF-8, wanted text", origin, line)};
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(text));
     if (documents.empty()) return YAML::Node();

@@ -215,7 +215,10 @@ RobotModel read_robot(Fields& fields) {
   fields.required("name", model.name);
   fields.optional("carries_itself", model.carries_itself);
   fields.list("links", [&](Fields& entry) { read_link(entry, model); });
-  if (!fields.is_sound()) return model;  // the rest names joints and links, some of which are missing now
+  if (!fields.is_sound()) {  // the rest names joints and links, some of which are missing now
+    fields.skip({"axes", "hand"});
+    return model;
+  }
   fields.list("axes", [&](Fields& entry) { read_axis(entry, model); });
   fields.section("hand", false, [&](Fields& entry) { read_hand(entry, model); });
   return model;

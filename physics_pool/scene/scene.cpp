@@ -222,7 +222,8 @@ class Inspection {
       const std::string& message = ok.error().message;  // "robot.links[2]…: got …"
       const std::size_t end = message.find(": ");
       const std::string shown = message.substr(0, end);
-      add({shown.substr(0, shown.find_first_of("[:")), shown}, end == message.npos ? "" : message.substr(end + 2));
+      add_relative({shown.substr(0, shown.find_first_of("[:")), shown},
+                   end == message.npos ? "" : message.substr(end + 2));
       return false;
     }
     check_pose(robot.base, {"robot.base.", "robot.base."});

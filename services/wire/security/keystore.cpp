@@ -104,6 +104,18 @@ std::string to_json(const std::vector<Record>& records) {
   return nlohmann::json{{"identities", list}}.dump(2) + "\n";
 }
 
+// A moment of the index, seconds since 1970: whole, and not beyond what clocks of nanoseconds reach (the year 2255).
+std::time_t moment_of(const nlohmann::json& entry, const char* key) {
+  constexpr std::time_t kLatest = 9'000'000'000;
+  const nlohmann::json& value = entry.at(key);
+  // Its text only if it is short: what lies deep in itself cannot be written by recursion.
+  if (!value.is_number_integer() || value.get<std::time_t>() < 0 || value.get<std::time_t>() > kLatest) {
+    const std::string got = value.is_number() ? value.dump() : value.type_name();
+    throw std::runtime_error(fmt::format("{}: got {}, wanted seconds, 0 to {}", key, got, kLatest));
+  }
+  return value.get<std::time_t>();
+}
+
 Result<std::vector<Record>> read_index(const fs::path& folder) {
   const fs::path file = folder / "ca" / "index.json";
   const auto text_result = files::read(file, files::kMostText);
@@ -117,8 +129,8 @@ Result<std::vector<Record>> read_index(const fs::path& folder) {
       records.push_back({.name = entry.at("name"),
                          .role = *role,
                          .serial = entry.at("serial"),
-                         .not_after = entry.at("not_after"),
-                         .revoked = entry.at("revoked")});
+                         .not_after = moment_of(entry, "not_after"),
+                         .revoked = moment_of(entry, "revoked")});
     }
     return records;
   } catch (const std::exception& error) {

@@ -172,6 +172,14 @@ TEST(YamlTree, ThatIsLargeDeepOrEndlessIsRefusedAtOnce) {
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(30));
 }
 
+TEST(YamlTree, IsUtf8) {
+  EXPECT_EQ(parsed("word: \"Dose, \xc3\xbc, \xe2\x82\xac, \xf0\x9f\xa4\x96\"")->word,
+            "Dose, \xc3\xbc, \xe2\x82\xac, \xf0\x9f\xa4\x96");
+  for (const char* bytes :
+       {"\xff", "\xc3", "\xc3(", "\xc0\x80", "\xe0\x80\x80", "\xed\xa0\x80", "\xf5\x80\x80\x80", "\xe2\x82"})
+    EXPECT_THAT(refusal(std::string("flag: true\nword: ") + bytes), HasSubstr("a.yaml:2: got bytes that are no UTF-8"));
+}
+
 TEST(YamlTree, OfSeveralDocumentsIsRefused) {
   EXPECT_THAT(refusal("flag: true\n---\nflag: false\n"), HasSubstr("got 2 YAML documents, wanted one"));
   EXPECT_TRUE(parsed("--- \nflag: true\n"));

@@ -107,7 +107,7 @@ Result<void> check_target(const fs::path& output, bool has_one_frame) {
   const files::Output target{
       .option = "--output", .path = output, .endings = {".png", ".mp4", ".gif"}, .is_folder = is_folder};
   if (has_one_frame && is_film(output)) {
-    return invalid(target.option, "'" + output.string() + "' for a single picture",
+    return invalid(target.option, fmt::format("'{}' for a single picture", output.string()),
                    ".png; films are drawn of a bag, or of several frames");
   }
   auto ok = files::check_output(target);

@@ -145,18 +145,29 @@ Error refusal(const std::filesystem::path& file, XMLDocument& document, const st
   return wrong(file, place, got_in(place), wanted);
 }
 
-// Numbers of which it reads as much as it can: 4 of "4 MiB".
+// Numbers of which it reads as much as it can, 4 of "4 MiB", or in other notations, 16 of "0x10".
 Result<void> check_numbers(const std::filesystem::path& file, const XMLElement& place) {
-  static const std::set<std::string> kNumbers{"depth",
-                                              "max_samples",
+  static const std::set<std::string> kNumbers{"allocated_samples",
+                                              "depth",
+                                              "domainId",
                                               "max_instances",
+                                              "max_samples",
                                               "max_samples_per_instance",
-                                              "allocated_samples",
-                                              "sendBufferSize",
-                                              "receiveBufferSize",
                                               "maxInitialPeersRange",
-                                              "segment_size"};
-  if (kNumbers.contains(place.Name()) && text_of(place).find_first_not_of("0123456789") != std::string::npos) {
+                                              "maxMessageSize",
+                                              "mutation_tries",
+                                              "nanosec",
+                                              "participantID",
+                                              "port",
+                                              "port_queue_capacity",
+                                              "receiveBufferSize",
+                                              "sec",
+                                              "segment_size",
+                                              "sendBufferSize",
+                                              "TTL"};
+  const std::string text = text_of(place);
+  const bool is_word = text.starts_with("DURATION_");  // DURATION_INFINITY and its like
+  if (kNumbers.contains(place.Name()) && !is_word && text.find_first_not_of("0123456789") != std::string::npos) {
     return wrong(file, place, got_in(place), kNumber);
   }
   for (const XMLElement* child = place.FirstChildElement(); child; child = child->NextSiblingElement()) {

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -53,6 +54,60 @@ TEST_F(Run, GraspsTheTargetOfAnEasySceneAndTellsAll) {
   EXPECT_GE(report["total_seconds"], report["plan_seconds"]);
   EXPECT_THAT(run->out(), HasSubstr("SUCCESS"));
   EXPECT_TRUE(run_folders().empty());
+}
+
+// A reader of the numbers needs to know which is which, when each state was and what was done in between.
+TEST_F(Run, SaysWhatItsNumbersAreAndWhen) {
+  ASSERT_EQ(finish({easy, "--pool", "threads", "--set", "step_duration=0.5", "--json", result_file()}), 0)
+      << run->err();
+
+  const json report = result();
+  const std::size_t seen = report["observed_states"].size();
+  EXPECT_EQ(report["observed_times"].size(), seen);
+  EXPECT_EQ(report["observed_velocities"].size(), seen);
+  EXPECT_EQ(report["controls"].size(), seen - 1);
+  EXPECT_EQ(report["plan_states"].size(), report["plan_controls"].size() + 1);
+  for (std::size_t i = 0; i < seen; ++i) EXPECT_NEAR(report["observed_times"][i].get<double>(), 0.5 * double(i), 1e-6);
+  const json& layout = report["layout"];
+  EXPECT_EQ(layout["q"].size(), report["observed_states"][0].size());
+  EXPECT_EQ(layout["v"].size(), report["observed_velocities"][0].size());
+  EXPECT_EQ(layout["u"].size(), report["controls"][0].size());
+  for (const char* part : {"q", "v", "u"}) {
+    EXPECT_EQ(layout[part].size(), layout[std::string(part) + "_units"].size());
+  }
+  EXPECT_EQ(report["changed_parameters"], json({{"step_duration", {{"value", 0.5}, {"default", 1.0}}}}));
+  const std::string text = contents(result_file());
+  EXPECT_LT(std::ranges::count(text, '\n'), 200) << "a state per line";
+}
+
+// The ordinary failure: no plan in time. It is an answer, not an accident.
+TEST_F(Run, ThatFindsNoPlanInTimeSaysSo) {
+  const std::string picture = folder.path() / "x.png";
+  ASSERT_EQ(finish({easy, "--workers", "1", "--parameters", endless, "--timeout", "1", "--json", result_file(),
+                    "--picture", picture}),
+            1)
+      << run->err();
+
+  EXPECT_THAT(run->out(), HasSubstr("FAILURE: timeout after 1 s"));
+  EXPECT_THAT(run->out(), HasSubstr("control.timeout 1, by default 900"));
+  const json report = result();
+  EXPECT_EQ(report["success"], false);
+  EXPECT_EQ(report["ending"], "timed out");
+  EXPECT_TRUE(report["cost"].is_null());
+  EXPECT_TRUE(report["plan_hash"].is_null());
+  EXPECT_TRUE(std::filesystem::exists(picture));
+  EXPECT_TRUE(run_folders().empty());
+}
+
+// What a file leaves out keeps what it is without the file.
+TEST_F(Run, ParameterFilesChangeOnlyWhatTheyName) {
+  const std::string file = folder.write("same.yaml", "control: {timeout: 200}\n");
+  const auto hash_with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {easy, "--plan-only", "--pool", "threads", "--json", result_file()});
+    EXPECT_EQ(finish(more), 0) << run->err();
+    return result()["plan_hash"];
+  };
+  EXPECT_EQ(hash_with({"--parameters", file}), hash_with({}));
 }
 
 TEST_F(Run, PinnedWorkersFindTheSamePlan) {

@@ -89,7 +89,7 @@ class RunFixture : public ::testing::Test {
   const int domain = test_domain();
   const TempFolder folder;
   std::string easy;     ///< scene: the straight way to the target is free
-  std::string plain;    ///< parameters: the code's defaults, few iterations
+  std::string plain;    ///< parameters: few iterations
   std::string endless;  ///< parameters: no plan is ever good enough
   std::unique_ptr<ProgramProcess> run;
 };

@@ -1,10 +1,11 @@
 #include "services/bags/replay/changes.hpp"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <charconv>
-#include <sstream>
+#include <optional>
+
+#include "services/task/config/parameter_keys.hpp"
 
 namespace jostle::bags {
 namespace {
@@ -13,51 +14,18 @@ Error unwanted(const std::string& key, const std::string& got, const char* wante
   return {Code::kInvalidArgument, fmt::format("--set {}: got '{}', wanted {}", key, got, wanted)};
 }
 
-std::string text_of(const YAML::Node& node) {
-  if (!node.IsDefined() || node.IsNull()) return "not set (default)";
-  YAML::Emitter out;
-  out << YAML::Flow << node;
-  return out.c_str();
-}
-
-// Sets the value of a dotted key; says what it was.
-std::string set(YAML::Node root, const std::string& key, const YAML::Node& value) {
-  std::istringstream in(key);
-  std::vector<std::string> words;
-  for (std::string word; std::getline(in, word, '.');) words.push_back(word);
-  YAML::Node node = root;
-  for (std::size_t i = 0; i + 1 < words.size(); ++i) node.reset(node[words[i]]);
-  const std::string before = text_of(node[words.back()]);
-  node[words.back()] = value;
-  return before;
-}
-
-Result<Change> set_parameter(const std::string& key, const std::string& value, jostle_msgs::msg::Goal& goal) {
-  try {
-    YAML::Node root = YAML::Load(goal.parameters());
-    if (!root.IsMap()) root = YAML::Node(YAML::NodeType::Map);
-    const YAML::Node node = YAML::Load(value);
-    Change change{.key = key, .recorded = set(root, key, node), .replayed = text_of(node)};
-    YAML::Emitter out;
-    out.SetDoublePrecision(17);
-    out << root;
-    goal.parameters(out.c_str());
-    return change;
-  } catch (const YAML::Exception& error) {
-    return unwanted(key, value, "a value as in a file of parameters, such as 8 or [0.1, 0.1]");
-  }
-}
-
-Result<Change> set_one(const std::string& key, const std::string& value, jostle_msgs::msg::Goal& goal) {
+// Sets one of the options that are not parameters; nothing if it is none of them.
+Result<std::optional<Change>> set_option(const std::string& key, const std::string& value,
+                                         jostle_msgs::msg::Goal& goal) {
   if (key == "controller") {
     const Change change{key, goal.controller(), value};
     goal.controller(value);
-    return change;
+    return std::optional(change);
   }
   if (key == "predictor") {
     const Change change{key, goal.predictor(), value};
     goal.predictor(value);
-    return change;
+    return std::optional(change);
   }
   if (key == "seed") {
     std::uint64_t seed = 0;
@@ -65,31 +33,53 @@ Result<Change> set_one(const std::string& key, const std::string& value, jostle_
     if (problem != std::errc{} || end != value.data() + value.size()) return unwanted(key, value, "a whole number");
     const Change change{key, std::to_string(goal.seed()), value};
     goal.seed(seed);
-    return change;
+    return std::optional(change);
   }
   if (key == "plan_only") {
     if (value != "true" && value != "false") return unwanted(key, value, "true or false");
     const Change change{key, goal.plan_only() ? "true" : "false", value};
     goal.plan_only(value == "true");
-    return change;
+    return std::optional(change);
   }
-  return set_parameter(key, value, goal);
+  return std::optional<Change>{};
+}
+
+Result<std::vector<Change>> set_parameters(const std::vector<std::string>& settings, jostle_msgs::msg::Goal& goal) {
+  auto recorded_result = task::parse_parameters(goal.parameters(), "goal.parameters");
+  if (!recorded_result) return recorded_result.error();
+  auto replayed_result = task::with_settings(*recorded_result, settings);
+  if (!replayed_result) return replayed_result.error();
+  goal.parameters(task::to_yaml(*replayed_result));
+  std::vector<Change> changes;
+  for (const task::ParameterDifference& difference : task::differences(*recorded_result, *replayed_result)) {
+    changes.push_back({difference.key, task::to_text(difference.before), task::to_text(difference.after)});
+  }
+  return changes;
 }
 
 }  // namespace
 
 Result<std::vector<Change>> apply_changes(const std::vector<std::string>& settings, jostle_msgs::msg::Goal& goal) {
   std::vector<Change> changes;
+  std::vector<std::string> others;  // parameters
   for (const std::string& setting : settings) {
     const auto equals = setting.find('=');
-    if (equals == std::string::npos || equals == 0 || equals + 1 == setting.size()) {
-      return Error{Code::kInvalidArgument,
-                   fmt::format("--set: got '{}', wanted KEY=VALUE such as planner.rollouts=4 or seed=2", setting)};
+    if (equals == std::string::npos) {
+      others.push_back(setting);
+      continue;
     }
-    auto change_result = set_one(setting.substr(0, equals), setting.substr(equals + 1), goal);
+    auto change_result = set_option(setting.substr(0, equals), setting.substr(equals + 1), goal);
     if (!change_result) return change_result.error();
-    if (change_result->recorded != change_result->replayed) changes.push_back(std::move(change_result).value());
+    if (!*change_result) {
+      others.push_back(setting);
+    } else if (const Change& change = **change_result; change.recorded != change.replayed) {
+      changes.push_back(change);
+    }
   }
+  if (others.empty()) return changes;
+  auto others_result = set_parameters(others, goal);
+  if (!others_result) return others_result.error();
+  changes.insert(changes.end(), others_result->begin(), others_result->end());
   return changes;
 }
 

@@ -18,8 +18,7 @@ struct Change {
 /// Sets options of a goal, each "KEY=VALUE". KEY is controller, predictor, seed or
 /// plan_only, or a key of the parameters such as planner.rollouts. Says what changed;
 /// what already was so is no change.
-/// Errors   kInvalidArgument  not KEY=VALUE, or no number where one is wanted; that a key
-///                            of the parameters exists is checked by Task::prepare
+/// Errors   kInvalidArgument  not KEY=VALUE, an unknown key, or a value that it cannot have
 Result<std::vector<Change>> apply_changes(const std::vector<std::string>& settings, jostle_msgs::msg::Goal& goal);
 
 }  // namespace jostle::bags

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "services/common/process/files.hpp"
+#include "services/common/results/json_text.hpp"
 
 namespace jostle::common {
 
@@ -75,7 +76,7 @@ nlohmann::json provenance() {
 Result<void> write_results(const std::filesystem::path& file, nlohmann::json results) {
   if (!results.is_object()) results = {{"results", std::move(results)}};
   results["provenance"] = provenance();
-  return write_text(file, results.dump(1) + "\n");
+  return write_text(file, json_text(results) + "\n");
 }
 
 }  // namespace jostle::common

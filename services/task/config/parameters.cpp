@@ -1,160 +1,184 @@
 #include "services/task/config/parameters.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "idl/text/yaml_fields.hpp"
-#include "physics_pool/objective/catalogue.hpp"
 #include "services/common/process/files.hpp"
+#include "services/task/config/parameter_keys.hpp"
 
 namespace jostle::task {
 namespace {
 
-using planners::ControlOptions;
-using planners::PbstoOptions;
+bool in_range(const ParameterKey& key, double value) { return value >= key.least && value <= key.most; }  // not NaN
 
-// Every kind of the catalogue by its name, every parameter as KIND_NAME; `angle` is what goal_angle was called.
-void read_objective(yaml::Fields& in, physics_pool::Objective& objective) {
-  for (const physics_pool::TermKind* kind : physics_pool::term_catalogue()) {
-    in.optional(kind->name, objective[kind->name].weight);
-    for (const physics_pool::TermParameter& parameter : kind->parameters) {
-      in.optional(fmt::format("{}_{}", kind->name, parameter.name).c_str(),
-                  objective.value(kind->name, parameter.name));
+bool in_range(const ParameterKey& key, const ParameterValue& value) {
+  return std::visit(
+      [&]<class T>(const T& v) {
+        if constexpr (std::is_same_v<T, std::vector<double>>) {
+          return std::ranges::all_of(v, [&](double number) { return in_range(key, number); });
+        } else if constexpr (std::is_same_v<T, std::string>) {
+          return std::ranges::find(key.words, v) != key.words.end();
+        } else {
+          return in_range(key, static_cast<double>(v));
+        }
+      },
+      value);
+}
+
+void read_as(const char* name, const ParameterKey& key, yaml::Fields& in, Parameters& parameters) {
+  ParameterValue value = key.get(parameters);
+  std::visit([&](auto& v) { in.optional(name, v); }, value);
+  if (!in.has(name)) return;
+  if (!in_range(key, value)) {
+    const std::string got = key.words.empty() ? to_text(value) : "'" + to_text(value) + "'";
+    in.refuse(name, fmt::format("got {}, wanted {}", got, key.wanted()));
+  }
+  key.set(parameters, value);
+}
+
+// Reads every key of a file that has the sections of the table.
+void read(const YAML::Node& root, const std::string& origin, Parameters& parameters) {
+  std::map<std::string, std::vector<ParameterKey>> sections;
+  for (ParameterKey& key : parameter_keys()) sections[key.section].push_back(std::move(key));
+  const auto read_section = [&](yaml::Fields& in, const std::vector<ParameterKey>& keys) {
+    for (const ParameterKey& key : keys) {
+      if (!key.also.empty()) read_as(key.also.c_str(), key, in, parameters);
+      read_as(key.name.c_str(), key, in, parameters);
+    }
+  };
+  yaml::Fields fields(root, "", origin);
+  for (const auto& [section, keys] : sections) {
+    if (section.empty()) {
+      read_section(fields, keys);
+    } else {
+      fields.section(section.c_str(), false, [&](yaml::Fields& in) { read_section(in, keys); });
     }
   }
-  in.optional("angle", objective.value("goal", "angle"));
-  in.optional("success_cost", objective.success_cost);
-}
-
-// `timeout` is checked before it becomes a duration, s.
-Parameters read(const YAML::Node& root, const std::string& origin, double& timeout) {
-  Parameters parameters;
-  PbstoOptions& planner = parameters.planner;
-  ControlOptions& control = parameters.controller.control;
-  planners::MpcOptions& mpc = parameters.controller.mpc;
-  yaml::Fields fields(root, "", origin);
-  fields.optional("step_duration", planner.step_duration);
-  fields.optional("min_steps", planner.min_steps);
-  fields.section("planner", false, [&](yaml::Fields& in) {
-    in.optional("rollouts", planner.rollouts);
-    in.optional("sigma", planner.sigma);
-    in.optional("limit", planner.limit);
-    in.optional("scales", planner.scales);
-    in.choice<PbstoOptions::Update>(
-        "update", planner.update,
-        {{"greedy", PbstoOptions::Update::kGreedy}, {"cost-weighted", PbstoOptions::Update::kCostWeighted}});
-    in.optional("lambda", planner.lambda);
-    in.optional("persistence", planner.persistence);
-    in.optional("stop_losers", planner.stop_losers);
-    in.optional("stop_hopeless", planner.stop_hopeless);
-    in.optional("freeze", planner.freeze);
-    in.optional("screening", planner.screening);
-    in.optional("screening_time_step", planner.screening_time_step);
-  });
-  fields.section("objective", false, [&](yaml::Fields& in) { read_objective(in, parameters.objective); });
-  fields.section("control", false, [&](yaml::Fields& in) {
-    in.optional("many_iterations", control.many_iterations);
-    in.optional("few_iterations", control.few_iterations);
-    in.optional("few_iterations_max", control.few_iterations_max);
-    in.optional("deviation_threshold", control.deviation_threshold);
-    in.optional("obstruction_patience", control.obstruction_patience);
-    in.optional("initial_steps", control.initial_steps);
-    in.optional("straight_speed", control.straight_speed);
-    in.optional("close_hand", control.close_hand);
-    in.optional("timeout", timeout);
-    int max_rollouts = 0;
-    in.optional("max_rollouts", max_rollouts);
-    if (max_rollouts < 0)
-      in.refuse("max_rollouts", fmt::format("got {}, wanted 0, for no limit, or more", max_rollouts));
-    parameters.limits.rollouts = static_cast<std::uint64_t>(max_rollouts);
-  });
-  fields.section("mpc", false, [&](yaml::Fields& in) {
-    in.optional("horizon", mpc.horizon);
-    in.optional("first_iterations", mpc.first_iterations);
-    in.optional("iterations", mpc.iterations);
-    in.optional("max_actions", mpc.max_actions);
-    in.optional("straight_speed", mpc.straight_speed);
-  });
   fields.finish();
-  control.step_duration = mpc.step_duration = planner.step_duration;
-  control.min_steps = planner.min_steps;
-  return parameters;
+  planners::ControlOptions& control = parameters.controller.control;
+  control.step_duration = parameters.controller.mpc.step_duration = parameters.planner.step_duration;
+  control.min_steps = parameters.planner.min_steps;
 }
 
-// A key, its value and the closed range it must lie in.
-struct Range {
-  const char* key;
-  double value, low, high;
-};
-
-// What no batch carries, and the objective, which is better refused where it is written.
-Result<void> check(const Parameters& parameters, double timeout, const std::string& origin) {
-  const PbstoOptions& planner = parameters.planner;
-  const ControlOptions& control = parameters.controller.control;
-  const planners::MpcOptions& mpc = parameters.controller.mpc;
-  for (const Range& range :
-       {Range{"planner.rollouts", double(planner.rollouts), 1, physics_pool::kMaxSamples},
-        Range{"planner.screening", double(planner.screening), 1, 1e4},
-        Range{"planner.screening_time_step", planner.screening_time_step, 1e-4, physics_pool::kMaxTimeStep},
-        Range{"planner.lambda", planner.lambda, 1e-9, 1e12},
-        Range{"min_steps", double(planner.min_steps), 0, physics_pool::kMaxSteps},
-        Range{"step_duration", planner.step_duration, 1e-3, physics_pool::kMaxStepDuration},
-        Range{"control.many_iterations", double(control.many_iterations), 0, 1e6},
-        Range{"control.few_iterations", double(control.few_iterations), 0, 1e6},
-        Range{"control.few_iterations_max", double(control.few_iterations_max), 0, 1e6},
-        Range{"control.obstruction_patience", double(control.obstruction_patience), 0, 1e6},
-        Range{"control.deviation_threshold", control.deviation_threshold, 0, 1e6},
-        Range{"control.initial_steps", double(control.initial_steps), 1, physics_pool::kMaxSteps},
-        Range{"control.straight_speed", control.straight_speed, 0, 1},
-        Range{"mpc.horizon", double(mpc.horizon), 1, physics_pool::kMaxSteps},
-        Range{"mpc.first_iterations", double(mpc.first_iterations), 0, 1e6},
-        Range{"mpc.iterations", double(mpc.iterations), 0, 1e6},
-        Range{"mpc.max_actions", double(mpc.max_actions), 1, 1e6},
-        Range{"mpc.straight_speed", mpc.straight_speed, 0, 1}, Range{"control.timeout", timeout, 1, 1e6}}) {
-    if (range.value >= range.low && range.value <= range.high) continue;  // false for NaN
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}: {}: got {}, wanted {} to {}", origin, range.key, range.value, range.low, range.high)};
-  }
+// What one key alone cannot be wrong in.
+Result<void> check(const Parameters& parameters, const std::string& origin) {
+  const planners::PbstoOptions& planner = parameters.planner;
   if (planner.sigma.empty() || planner.sigma.size() != planner.limit.size()) {
-    return Error{
-        Code::kInvalidArgument,
-        fmt::format("{}: planner.sigma: got {} numbers and {} of planner.limit, wanted one of each for every axis "
-                    "of the robot",
-                    origin, planner.sigma.size(), planner.limit.size())};
+    return invalid(origin + ": planner.sigma",
+                   fmt::format("{} numbers and {} of planner.limit", planner.sigma.size(), planner.limit.size()),
+                   "one of each for every axis of the robot");
   }
-  if (auto ok = physics_pool::validate(parameters.objective); !ok) {
-    return Error{ok.error().code, fmt::format("{}: {}", origin, ok.error().message)};
-  }
+  if (planner.scales.empty()) return invalid(origin + ": planner.scales", "an empty list", "at least one factor");
   if (double(planner.rollouts) * planner.screening > physics_pool::kMaxSamples) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}: planner.rollouts times planner.screening: got {}, wanted at most {}", origin,
-                             double(planner.rollouts) * planner.screening, physics_pool::kMaxSamples)};
+    return invalid(origin + ": planner.rollouts times planner.screening",
+                   fmt::format("{}", double(planner.rollouts) * planner.screening),
+                   fmt::format("at most {}", physics_pool::kMaxSamples));
   }
   const double steps = planner.step_duration / planner.screening_time_step;
   if (planner.screening > 1 && std::abs(steps - std::round(steps)) > 1e-6 * steps) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}: planner.screening_time_step: got {} s, wanted a part of step_duration, {} s, "
-                             "without remainder",
-                             origin, planner.screening_time_step, planner.step_duration)};
+    return invalid(origin + ": planner.screening_time_step", fmt::format("{} s", planner.screening_time_step),
+                   fmt::format("a part of step_duration, {} s, without remainder", planner.step_duration));
   }
   return {};
 }
 
-}  // namespace
-
-Result<Parameters> parse_parameters(std::string_view text, const std::string& origin) {
-  return yaml::parse<Parameters>(text, origin, [&](const YAML::Node& root) -> Result<Parameters> {
-    double timeout = std::chrono::duration<double>(planners::RunLimits{}.timeout).count();
-    Parameters parameters = read(root, origin, timeout);
-    if (auto ok = check(parameters, timeout, origin); !ok) return ok.error();
-    parameters.limits.timeout = std::chrono::milliseconds(std::llround(timeout * 1e3));
-    return parameters;
-  });
+Result<Parameters> read_and_check(const YAML::Node& root, const std::string& origin, Parameters parameters) {
+  read(root, origin, parameters);
+  if (auto ok = check(parameters, origin); !ok) return ok.error();
+  return parameters;
 }
 
-Result<Parameters> load_parameters(const std::filesystem::path& file) {
+// Finds a key of this name in whatever section, for somebody who left the section out.
+std::string key_meant(std::string_view name) {
+  for (const ParameterKey& key : parameter_keys()) {
+    if (!key.section.empty() && key.name == name) return key.path();
+  }
+  return {};
+}
+
+// Puts one setting into the tree that a file with it would have.
+Result<void> add_setting(const std::string& setting, YAML::Node root) {
+  const auto equals = setting.find('=');
+  if (equals == setting.npos || equals == 0 || equals + 1 == setting.size()) {
+    return invalid("--set", "'" + setting + "'",
+                   "KEY=VALUE, such as planner.rollouts=4; `jostle parameters` lists the keys");
+  }
+  const std::string path = setting.substr(0, equals);
+  if (const std::string meant = key_meant(path); !meant.empty()) {
+    return invalid("--set", "the key '" + path + "'", "'" + meant + "'");
+  }
+  try {
+    const YAML::Node value = YAML::Load(setting.substr(equals + 1));
+    const auto dot = path.find('.');
+    if (dot == path.npos) {
+      root[path] = value;
+    } else {
+      root[path.substr(0, dot)][path.substr(dot + 1)] = value;
+    }
+  } catch (const YAML::Exception&) {
+    return invalid("--set " + path, "'" + setting.substr(equals + 1) + "'",
+                   "a value as in a file, such as 8 or [0.1, 0.1]");
+  }
+  return {};
+}
+
+// A command line has no lines: "--set:1: planner.lambda: …" loses its number.
+std::string without_line(std::string message, const std::string& origin) {
+  if (!message.starts_with(origin + ":")) return message;
+  const auto after = message.find_first_not_of("0123456789", origin.size() + 1);
+  return after == message.npos ? message : message.replace(origin.size(), after + 1 - origin.size(), "");
+}
+
+}  // namespace
+
+Result<Parameters> parse_parameters(std::string_view text, const std::string& origin, const Parameters& base) {
+  return yaml::parse<Parameters>(text, origin,
+                                 [&](const YAML::Node& root) { return read_and_check(root, origin, base); });
+}
+
+Result<Parameters> load_parameters(const std::filesystem::path& file, const Parameters& base) {
   auto text_result = common::read_text(file);
   if (!text_result) return text_result.error();
-  return parse_parameters(*text_result, file.string());
+  return parse_parameters(*text_result, file.string(), base);
+}
+
+Result<Parameters> with_settings(const Parameters& base, const std::vector<std::string>& settings) {
+  if (settings.empty()) return base;
+  const std::string origin = "--set";
+  YAML::Node root(YAML::NodeType::Map);
+  for (const std::string& setting : settings) {
+    if (auto ok = add_setting(setting, root); !ok) return ok.error();
+  }
+  auto result =
+      yaml::read<Parameters>(root, origin, [&](const YAML::Node& node) { return read_and_check(node, origin, base); });
+  if (!result) return Error{result.error().code, without_line(result.error().message, origin)};
+  return result;
+}
+
+Result<Parameters> standard_parameters(const planners::ControllerKind& controller) {
+  return load_parameters(common::data_file(controller.parameters));
+}
+
+Result<Parameters> choose_parameters(const planners::ControllerKind& controller, const ParameterOptions& options) {
+  auto parameters_result = standard_parameters(controller);
+  if (parameters_result && !options.file.empty()) parameters_result = load_parameters(options.file, *parameters_result);
+  if (!parameters_result) return parameters_result;
+  std::vector<std::string> settings = options.settings;
+  if (options.timeout) settings.push_back(fmt::format("control.timeout={}", *options.timeout));
+  return with_settings(*parameters_result, settings);
+}
+
+std::string to_yaml(const Parameters& parameters) {
+  std::string text, section;
+  for (const ParameterKey& key : parameter_keys()) {
+    if (key.section != section) text += (section = key.section) + ":\n";
+    text += fmt::format("{}{}: {}\n", section.empty() ? "" : "  ", key.name, to_text(key.get(parameters)));
+  }
+  return text;
 }
 
 Result<void> check_fit(const Parameters& parameters, const physics_pool::Scene& scene) {

@@ -75,16 +75,25 @@ void tell(wire::Writer<T>& writer, const T& message, const std::string& what) {
   }
 }
 
-// What the asker puts into result.json and draws.
-std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::uint64_t seed, const Rollouts& used) {
+nlohmann::json rows(const ControlSequence& controls) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (int t = 0; t < controls.steps(); ++t) rows.push_back(controls.step(t));
+  return rows;
+}
+
+// What the asker puts into result.json and draws; docs/results.md says what each key is. `seen`: as told to the
+// journal, entry i being what outcome.observed[i] was made of.
+std::string report_of(const planners::Outcome& outcome, const Task& task, std::uint64_t seed, const Rollouts& used,
+                      const std::vector<jostle_msgs::msg::Observation>& seen) {
   const planners::Plan& plan = outcome.first_plan;
+  const bool has_plan = plan.controls.steps() > 0;
   nlohmann::json report{{"success", outcome.success},
                         {"ending", to_string(outcome.ending)},
                         {"reason", outcome.reason},
-                        {"scene_hash", to_string(scene)},
+                        {"scene_hash", to_string(physics_pool::scene_hash(task.execution_scene()))},
                         {"seed", seed},
-                        {"plan_hash", to_string(hash_of(plan.controls.values))},
-                        {"cost", plan.cost},
+                        {"plan_hash", has_plan ? nlohmann::json(to_string(hash_of(plan.controls.values))) : nullptr},
+                        {"cost", has_plan ? nlohmann::json(plan.cost) : nullptr},
                         {"iterations", plan.iterations},
                         {"replans", outcome.replans},
                         {"actions", outcome.actions},
@@ -94,10 +103,20 @@ std::string report_of(const planners::Outcome& outcome, const Hash& scene, std::
                         {"rollouts", outcome.rollouts},
                         {"used_workers", used},
                         {"dropped_objects", outcome.dropped},
-                        {"plan_states", nlohmann::json::array()},
-                        {"observed_states", nlohmann::json::array()}};
+                        {"step_duration", task.parameters().planner.step_duration},
+                        {"plan_controls", rows(plan.controls)}};
+  for (const char* key : {"plan_states", "observed_states", "observed_velocities", "observed_times", "controls"}) {
+    report[key] = nlohmann::json::array();
+  }
   for (const State& x : plan.states) report["plan_states"].push_back(x.q);
-  for (const State& x : outcome.observed) report["observed_states"].push_back(x.q);
+  for (const State& x : outcome.observed) {
+    report["observed_states"].push_back(x.q);
+    report["observed_velocities"].push_back(x.v);
+  }
+  for (const jostle_msgs::msg::Observation& observation : seen) {
+    report["observed_times"].push_back(world::seconds(observation.header()));
+    if (!observation.command().empty()) report["controls"].push_back(observation.command());
+  }
   return report.dump();
 }
 
@@ -153,14 +172,15 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   {
     const std::jthread refuser([this](std::stop_token own) { refuse_goals_meanwhile(own); });
     auto task_result = Task::prepare(goal, pool_, [](const std::string& why) { spdlog::info("split: {}", why); });
+    std::vector<jostle_msgs::msg::Observation> seen;
     auto outcome_result =
-        task_result ? perform(goal, *task_result, cancelled) : Result<planners::Outcome>(task_result.error());
+        task_result ? perform(goal, *task_result, seen, cancelled) : Result<planners::Outcome>(task_result.error());
     if (outcome_result) {
       result.ending(on_the_wire(outcome_result->ending));
       result.success(outcome_result->success);
       result.reason(outcome_result->reason);
-      result.report(report_of(*outcome_result, physics_pool::scene_hash(task_result->execution_scene()), goal.seed(),
-                              since(before, rollouts_of(pool_.status()))));
+      result.report(
+          report_of(*outcome_result, *task_result, goal.seed(), since(before, rollouts_of(pool_.status())), seen));
     } else {
       const Error& error = outcome_result.error();
       const bool was_cancelled = error.code == Code::kCancelled;
@@ -188,7 +208,8 @@ void Coordinator::answer(const jostle_msgs::msg::GoalResult& result, std::stop_t
   }
 }
 
-Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task, std::stop_token stop) {
+Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task,
+                                               std::vector<jostle_msgs::msg::Observation>& seen, std::stop_token stop) {
   const physics_pool::TaskGeometry& geometry = task.geometry();
   world::RobotClient robot(participant_);
   world::ObjectsClient objects(participant_, robot);
@@ -198,8 +219,9 @@ Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task, std
       .on_event = [&](const planners::ControlEvent& event) { note(event, geometry); },
       .on_progress = [&](const planners::Progress& progress) { note(progress, geometry); },
       .journal = {.on_observation =
-                      [&](const jostle_msgs::msg::Observation& seen) {
-                        tell(observation_writer_, seen, fmt::format("{}observation {}", goal_text, seen.number()));
+                      [&](const jostle_msgs::msg::Observation& news) {
+                        tell(observation_writer_, news, fmt::format("{}observation {}", goal_text, news.number()));
+                        seen.push_back(news);
                       },
                   .on_plan =
                       [&](const jostle_msgs::msg::Plan& plan) {

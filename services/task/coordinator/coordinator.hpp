@@ -8,6 +8,7 @@
 #include <mutex>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "physics_pool/api/pool.hpp"
 #include "services/task/session/task.hpp"
@@ -34,7 +35,9 @@ class Coordinator {
  private:
   using Goal = jostle_msgs::msg::Goal;
 
-  Result<planners::Outcome> perform(const Goal& goal, Task& task, std::stop_token stop);
+  // Adds to `seen` what the journal is told.
+  Result<planners::Outcome> perform(const Goal& goal, Task& task, std::vector<jostle_msgs::msg::Observation>& seen,
+                                    std::stop_token stop);
   void serve(const Goal& goal, std::stop_token stop);
   void answer(const jostle_msgs::msg::GoalResult& result, std::stop_token stop);
   void refuse_goals_meanwhile(std::stop_token stop);

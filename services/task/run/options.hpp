@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What `jostle run` was asked for.
+/// What `jostle run` and `jostle goal` were asked for.
 
 #include <cstdint>
 #include <filesystem>
@@ -8,19 +8,26 @@
 #include <string>
 #include <vector>
 
+#include "idl/msg/task.h"
 #include "physics_pool/scene/scene.hpp"
 #include "physics_pool/uncertainty/levels.hpp"
+#include "services/task/config/parameter_keys.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace jostle::task {
 
 struct RunOptions {
-  physics_pool::Scene scene;     ///< execution world
-  physics_pool::Scene planning;  ///< what the planner believes
-  std::string parameters;        ///< YAML text
+  physics_pool::Scene scene;                 ///< execution world
+  physics_pool::Scene planning;              ///< what the planner believes
+  std::string parameters;                    ///< YAML text, complete
+  std::vector<ParameterDifference> changed;  ///< what differs from the controller's own parameters
   physics_pool::Uncertainty level = physics_pool::Uncertainty::kNone;
   std::string controller;          ///< a name of planners/controllers/catalogue.hpp
   std::string predictor = "fine";  ///< see services/task/config/predictor.hpp
-  std::string pool = "dds";
+  std::string pool = "dds";  ///< dds or threads; empty: that of a coordinator which runs already
   int workers = 2;
   std::vector<int> cores;  ///< dealt to the workers in turn; empty: not pinned
   std::uint64_t seed = 1;
@@ -31,5 +38,21 @@ struct RunOptions {
   std::filesystem::path json, picture;  ///< empty: none
   std::filesystem::path record;         ///< a bag's folder; empty: nothing is recorded
 };
+
+/// What a command line says of a goal, as it was typed.
+struct GoalArguments {
+  std::string scene, level = "none";
+  ParameterOptions parameters;
+};
+
+/// Adds the options of a goal and of what is left of it, which `jostle run` and `jostle goal` share.
+void add_goal_options(CLI::App& app, GoalArguments& arguments, RunOptions& options);
+
+/// Reads the files that the arguments name, and fills in what they decide.
+/// Errors   kInvalidArgument, kIo, naming the option or the file
+Result<void> complete(const GoalArguments& arguments, RunOptions& options);
+
+/// Returns the goal that these options describe, without its id.
+jostle_msgs::msg::Goal make_goal(const RunOptions& options);
 
 }  // namespace jostle::task

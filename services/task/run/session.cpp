@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <iterator>
 
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
@@ -47,12 +46,7 @@ Session::Session(const RunOptions& options, Watcher watcher, wire::Participant p
       participant_(std::move(participant)),
       claim_(std::move(claim)),
       folder_(std::move(folder)),
-      goal_id_(folder_.filename().string()),
-      goal_(participant_, wire::topics::kTaskGoal),
-      cancel_(participant_, wire::topics::kTaskCancel),
-      feedback_(participant_, wire::topics::kTaskFeedback, 64),
-      world_(participant_, wire::topics::kRobotStatus, 64),
-      results_(participant_, wire::topics::kTaskResult, 8) {}
+      client_(participant_, folder_.filename().string(), watcher_.on_feedback) {}
 
 Session::~Session() {
   // All at once, then one after the other: shutting down takes as long as the slowest.
@@ -157,60 +151,39 @@ Result<common::ChildProcess> Session::start_worker(std::size_t place) {
 Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
   std::optional<Clock::time_point> cancelled;
   for (;;) {
-    if (auto result = results_.take(Clock::now() + kTick, cancelled ? std::stop_token{} : stop)) {
-      if (result->goal_id() == goal_id_) {
-        if (cancelled) return Error{Code::kCancelled, "interrupted; the task was cancelled"};
-        return *std::move(result);
-      }
+    if (auto result = client_.wait(Clock::now() + kTick, cancelled ? std::stop_token{} : stop)) {
+      if (cancelled) return Error{Code::kCancelled, "interrupted; the task was cancelled"};
+      return *std::move(result);
     }
     if (stop.stop_requested() && !cancelled) {
       cancelled = Clock::now();
-      jostle_msgs::msg::Cancel cancel;
-      cancel.goal_id(goal_id_);
-      (void)cancel_.write(cancel);  // if it is lost, the coordinator is ended after kCancelPatience
+      client_.cancel();  // if it is lost, the coordinator is ended after kCancelPatience
     }
-    if (cancelled && (!sent_ || Clock::now() - *cancelled > kCancelPatience)) {
+    if (cancelled && (!client_.is_sent() || Clock::now() - *cancelled > kCancelPatience)) {
       return Error{Code::kCancelled, "interrupted"};
     }
-    listen();
+    client_.listen();
     if (auto ok = look_after(); !ok) return ok.error();
-    if (!sent_ && !cancelled) {
+    if (!client_.is_sent() && !cancelled) {
       if (auto ok = send_goal(); !ok) return ok.error();
     }
   }
 }
 
-void Session::listen() {
-  for (const auto& feedback : feedback_.take_all()) {
-    coordinator_heard_ = Clock::now();
-    // Ours is idle until it gets our goal; it may be the last one we hear of.
-    if (!sent_ && !feedback.goal_id().empty()) others_heard_ = true;
-    if (sent_ && feedback.goal_id() == goal_id_ && watcher_.on_feedback) watcher_.on_feedback(feedback);
-  }
-  if (!world_.take_all().empty()) world_heard_ = Clock::now();
-}
-
-// Who takes goals and gives feedback. Whoever does only one of them looks on.
-std::vector<std::uint64_t> Session::coordinators() const {
-  std::vector<std::uint64_t> both;
-  std::ranges::set_intersection(goal_.matched_participants(), feedback_.matched_participants(),
-                                std::back_inserter(both));
-  return both;
-}
-
 // The goal goes out once everybody who has a part in it was heard and hears us.
 Result<void> Session::send_goal() {
-  const std::vector<std::uint64_t> found = coordinators();
-  if (others_heard_ || found.size() > 1) {
+  const std::vector<std::uint64_t> found = client_.coordinators();
+  if (client_.others_heard() || found.size() > 1) {
     return Error{Code::kUnavailable,
-                 fmt::format("domain {}: got another coordinator beside ours, wanted none; another run uses "
-                             "this domain, set ROS_DOMAIN_ID to a free one, or --namespace to one of its own",
+                 fmt::format("domain {}: got another coordinator beside ours, wanted none; another run or a `jostle "
+                             "play` uses this domain: set ROS_DOMAIN_ID to a free one, or --namespace to one of its "
+                             "own; `jostle goal` gives a goal to a coordinator that runs",
                              participant_.domain())};
   }
   // Another one may be found before ours is there: it says its number when it starts.
   const bool ours = found.size() == 1 && coordinator_process_->has_said(common::participant_name(found.front()));
-  const bool answers = ours && feedback_.last_writer() == found.front() && results_.hears(found.front());
-  if (!answers || !world_heard_) {
+  const bool answers = ours && client_.reaches(found.front());
+  if (!answers || !client_.world_heard()) {
     if (Clock::now() < goal_deadline_) return {};
     return Error{Code::kUnavailable,
                  fmt::format("{} not heard within {} s of its start on domain {}; `jostle doctor` checks "
@@ -218,17 +191,7 @@ Result<void> Session::send_goal() {
                              answers ? "the simulated world was" : "the coordinator was", kStart.count(),
                              participant_.domain())};
   }
-  jostle_msgs::msg::Goal goal;
-  goal.goal_id(goal_id_);
-  goal.execution_scene(physics_pool::to_yaml(options_.scene));
-  goal.planning_scene(physics_pool::to_yaml(options_.planning));
-  goal.parameters(options_.parameters);
-  goal.controller(options_.controller);
-  goal.predictor(options_.predictor);
-  goal.seed(options_.seed);
-  goal.plan_only(options_.plan_only);
-  sent_ = goal_.write(goal);
-  if (sent_ || Clock::now() < goal_deadline_) return {};  // tried again at the next tick
+  if (client_.send(make_goal(options_)) || Clock::now() < goal_deadline_) return {};  // tried again at the next tick
   return Error{Code::kUnavailable,
                fmt::format("the goal could not be sent within {} s: the middleware did not take it; profiles that "
                            "limit {} may be the reason",
@@ -239,11 +202,11 @@ Result<void> Session::look_after() {
   look_after_recorder();
   if (auto ok = check_alive("the simulated world", *world_process_); !ok) return ok;
   if (auto ok = check_alive("the coordinator", *coordinator_process_); !ok) return ok;
-  if (world_heard_) {
-    if (auto ok = check_heard("the simulated world", *world_heard_); !ok) return ok;
+  if (const auto heard = client_.world_heard()) {
+    if (auto ok = check_heard("the simulated world", *heard); !ok) return ok;
   }
-  if (coordinator_heard_) {
-    if (auto ok = check_heard("the coordinator", *coordinator_heard_); !ok) return ok;
+  if (const auto heard = client_.coordinator_heard()) {
+    if (auto ok = check_heard("the coordinator", *heard); !ok) return ok;
   }
   for (common::ChildProcess& worker : workers_) {
     const auto ended = worker.ended();

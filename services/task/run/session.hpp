@@ -13,11 +13,9 @@
 
 #include "services/common/process/child_process.hpp"
 #include "services/common/process/domain_claim.hpp"
+#include "services/task/run/goal_client.hpp"
 #include "services/task/run/options.hpp"
 #include "services/wire/dds/participant.hpp"
-#include "services/wire/dds/reader.hpp"
-#include "services/wire/dds/topics.hpp"
-#include "services/wire/dds/writer.hpp"
 
 namespace jostle::task {
 
@@ -51,7 +49,7 @@ class Session {
   void finish_recording();
 
  private:
-  using Clock = std::chrono::steady_clock;
+  using Clock = GoalClient::Clock;
 
   Session(const RunOptions& options, Watcher watcher, wire::Participant participant, common::DomainClaim claim,
           std::filesystem::path folder);
@@ -63,8 +61,6 @@ class Session {
   void look_after_recorder();
   Result<void> check_alive(const std::string& name, common::ChildProcess& child) const;
   Result<void> check_heard(const std::string& name, Clock::time_point heard) const;
-  void listen();
-  std::vector<std::uint64_t> coordinators() const;  // their participants, ascending
   Result<void> send_goal();
 
   const RunOptions& options_;
@@ -72,18 +68,9 @@ class Session {
   wire::Participant participant_;
   common::DomainClaim claim_;
   std::filesystem::path folder_;  // for logs and the scene; removed at the end
-  std::string goal_id_;
-  bool sent_ = false;          // whether the goal was
-  bool others_heard_ = false;  // a coordinator that works for somebody else
   int workers_started_ = 0;
   Clock::time_point goal_deadline_;
-  std::optional<Clock::time_point> coordinator_heard_, world_heard_;
-
-  wire::Writer<jostle_msgs::msg::Goal> goal_;
-  wire::Writer<jostle_msgs::msg::Cancel> cancel_;
-  wire::Inbox<jostle_msgs::msg::Feedback> feedback_;
-  wire::Inbox<jostle_msgs::msg::RobotStatus> world_;
-  wire::Inbox<jostle_msgs::msg::GoalResult> results_;
+  GoalClient client_;
 
   std::vector<common::ChildProcess> workers_;
   std::vector<Clock::time_point> restarts_;

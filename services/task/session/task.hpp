@@ -41,6 +41,7 @@ class Task {
   const physics_pool::Scene& execution_scene() const { return execution_; }
   const physics_pool::TaskGeometry& geometry() const { return run_.geometry(); }  ///< that of the planning scene
   Parameters& parameters() { return run_.parameters(); }
+  const Parameters& parameters() const { return run_.parameters(); }
 
  private:
   Task(std::string goal_id, physics_pool::Scene execution, Predictor predictor, Composition run);

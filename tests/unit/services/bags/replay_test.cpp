@@ -198,7 +198,7 @@ TEST_F(Replay, AChangeThatChangesNothingIsStillTold) {
   const RecordedRun recorded = record(push());
   const ReplayReport report = again(recorded, {"control.many_iterations=7"});  // of grasping only
   EXPECT_TRUE(report.comparison.bit_equal());
-  EXPECT_THAT(verdict(recorded, report), HasSubstr("control.many_iterations: recorded not set (default), replayed 7"));
+  EXPECT_THAT(verdict(recorded, report), HasSubstr("control.many_iterations: recorded 50, replayed 7"));
 }
 
 }  // namespace

@@ -5,7 +5,9 @@
 
 #include <filesystem>
 #include <fstream>
+#include <set>
 
+#include "services/task/config/parameter_keys.hpp"
 #include "tests/support/costs.hpp"
 
 namespace jostle::task {
@@ -166,7 +168,7 @@ const std::vector<Case> kCases{
     {"UnknownPlannerKey", "planner:\n  rollout: 3\n", {"p.yaml:2", "planner.rollout", "unknown key", "rollouts"}},
     {"UnknownObjectiveKey", "objective: {gaol: 3}\n", {"p.yaml:1", "objective.gaol", "unknown key", "goal"}},
     {"UnknownControlKey", "control: {timeouts: 3}\n", {"p.yaml:1", "control.timeouts", "unknown key", "timeout"}},
-    {"UnknownUpdate", "planner: {update: best}\n", {"p.yaml:1", "planner.update", "'best'", "greedy, cost-weighted"}},
+    {"UnknownUpdate", "planner: {update: best}\n", {"p.yaml:1", "planner.update", "'best'", "greedy or cost-weighted"}},
     {"WrongType", "planner:\n  rollouts: many\n", {"p.yaml:2", "planner.rollouts", "'many'", "a whole number"}},
     {"ThreeSigmas",
      "planner: {sigma: [1, 2, 3]}\n",
@@ -178,7 +180,13 @@ const std::vector<Case> kCases{
     {"NoActions", "mpc: {max_actions: 0}\n", {"p.yaml", "mpc.max_actions", "got 0", "1 to"}},
     {"UnknownMpcKey", "mpc: {steps: 3}\n", {"p.yaml:1", "mpc.steps", "unknown key", "horizon"}},
     {"NaNTimeout", "control: {timeout: .nan}\n", {"p.yaml", "control.timeout", "nan", "1 to"}},
-    {"NegativeBudget", "control: {max_rollouts: -3}\n", {"p.yaml:1", "control.max_rollouts", "got -3", "no limit"}},
+    {"NegativeBudget", "control: {max_rollouts: -3}\n", {"p.yaml:1", "control.max_rollouts", "got -3", "0 to"}},
+    {"NegativeSigma",
+     "planner:\n  sigma: [1, 1, -1, 1]\n",
+     {"p.yaml:2", "planner.sigma", "[1, 1, -1, 1]", "at least 0"}},
+    {"PersistenceOfOne", "planner: {persistence: 1}\n", {"p.yaml:1", "planner.persistence", "got 1", "less than 1"}},
+    {"NoScales", "planner: {scales: []}\n", {"p.yaml", "planner.scales", "empty", "at least one"}},
+    {"NegativeWeight", "objective:\n  goal: -1\n", {"p.yaml:2", "objective.goal", "got -1", "at least 0"}},
     {"NoSteps", "control: {initial_steps: 0}\n", {"p.yaml", "control.initial_steps", "got 0", "1 to"}},
     {"NoRollouts", "planner: {rollouts: 0}\n", {"p.yaml", "planner.rollouts", "got 0", "1 to"}},
     {"NotYaml", "planner: [\n", {"p.yaml:", "not YAML"}},
@@ -202,6 +210,93 @@ TEST(Parameters, AreLoadedFromAFile) {
   std::filesystem::remove(file);
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(result->planner.min_steps, 3);
+}
+
+// What a file leaves out keeps what it was before, not what the code has.
+TEST(Parameters, ChangeOfABaseWhatTheyName) {
+  const Parameters base = parsed("planner: {rollouts: 17, freeze: true}\nobjective: {edge_rate: 5}\n");
+  const auto result = parse_parameters("planner: {rollouts: 4}\n", "p.yaml", base);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->planner.rollouts, 4);
+  EXPECT_TRUE(result->planner.freeze);
+  EXPECT_EQ(result->objective.value("edge", "rate"), 5);
+}
+
+TEST(Parameters, OfEveryControllerSurviveWritingAndReading) {
+  for (const planners::ControllerKind* controller : planners::controllers()) {
+    const auto standard = standard_parameters(*controller);
+    ASSERT_TRUE(standard) << standard.error().message;
+    const auto again = parse_parameters(to_yaml(*standard), "p.yaml");
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_TRUE(differences(*standard, *again).empty());
+    EXPECT_EQ(to_yaml(*again), to_yaml(*standard));
+  }
+}
+
+// Whatever a number is, its text reads back bit-equal.
+TEST(Parameters, KeepEveryBit) {
+  Parameters odd;
+  odd.planner.lambda = 0.1 + 0.2;
+  odd.planner.sigma[0] = 1e-17 / 3;
+  const auto again = parse_parameters(to_yaml(odd), "p.yaml");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->planner.lambda, odd.planner.lambda);
+  EXPECT_EQ(again->planner.sigma, odd.planner.sigma);
+}
+
+TEST(ParameterSettings, ChangeWhatTheyNameTheLastOneOfAKeyCounting) {
+  const auto result = with_settings(
+      {}, {"planner.rollouts=4", "planner.sigma=[1, 2]", "planner.limit=[3, 4]", "min_steps=5", "planner.rollouts=6"});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->planner.rollouts, 6);
+  EXPECT_THAT(result->planner.sigma, testing::ElementsAre(1, 2));
+  EXPECT_EQ(result->controller.control.min_steps, 5);
+}
+
+TEST(ParameterSettings, AreRefusedWithTheReason) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> cases{
+      {"rollouts=4", {"--set", "'rollouts'", "planner.rollouts"}},
+      {"planner.rolouts=4", {"--set planner.rolouts", "unknown key", "rollouts"}},
+      {"planner.rollouts=0", {"--set planner.rollouts", "got 0", "1 to 1000000"}},
+      {"planner.rollouts", {"--set", "'planner.rollouts'", "KEY=VALUE"}},
+      {"planner.sigma=[1", {"--set planner.sigma", "'[1'", "[0.1, 0.1]"}},
+      {"planner=4", {"--set planner", "'4'", "a mapping"}},
+      {"nothing=4", {"--set nothing", "unknown key", "step_duration"}}};
+  for (const auto& [setting, told] : cases) {
+    const auto result = with_settings({}, {setting});
+    ASSERT_FALSE(result) << setting;
+    EXPECT_EQ(result.error().code, Code::kInvalidArgument);
+    for (const std::string& words : told) EXPECT_THAT(result.error().message, HasSubstr(words));
+  }
+}
+
+TEST(ParameterKeys, AreEachDocumentedAndWithinTheirOwnRange) {
+  std::set<std::string> seen;
+  for (const ParameterKey& key : parameter_keys()) {
+    EXPECT_TRUE(seen.insert(key.path()).second) << key.path();
+    EXPECT_GT(key.meaning.size(), 10u) << key.path();
+    EXPECT_EQ(key.meaning.back(), '.') << key.path();
+    EXPECT_FALSE(key.wanted().empty()) << key.path();
+  }
+}
+
+// Setting a key changes this key and no other.
+TEST(ParameterKeys, SetWhatTheyGet) {
+  const Parameters standard;
+  for (const ParameterKey& key : parameter_keys()) {
+    ParameterValue value = key.get(standard);
+    if (bool* flag = std::get_if<bool>(&value)) *flag = !*flag;
+    if (std::int64_t* count = std::get_if<std::int64_t>(&value)) *count += 1;
+    if (double* number = std::get_if<double>(&value)) *number += 0.25;
+    if (auto* list = std::get_if<std::vector<double>>(&value)) list->front() += 1;
+    if (std::string* text = std::get_if<std::string>(&value)) *text = key.words.back();
+    Parameters changed;
+    key.set(changed, value);
+    const auto found = differences(standard, changed);
+    ASSERT_EQ(found.size(), 1u) << key.path();
+    EXPECT_EQ(found[0].key, key.path());
+    EXPECT_EQ(found[0].after, value);
+  }
 }
 
 }  // namespace

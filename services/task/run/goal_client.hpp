@@ -1,0 +1,70 @@
+#pragma once
+/// \file
+/// The asker's side of a task: a goal goes out, feedback and one result come back.
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "services/wire/dds/participant.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
+
+namespace jostle::task {
+
+/// A GoalClient asks the coordinator of a domain to perform one goal.
+///
+/// Threads  one.
+class GoalClient {
+ public:
+  using Clock = std::chrono::steady_clock;
+  using OnFeedback = std::function<void(const jostle_msgs::msg::Feedback&)>;
+
+  /// `goal_id`: unique among all goals of the domain. `on_feedback`: hears of this goal alone; may be empty.
+  GoalClient(const wire::Participant& participant, std::string goal_id, OnFeedback on_feedback);
+
+  const std::string& goal_id() const { return goal_id_; }
+
+  /// Takes what has come since the last call.
+  void listen();
+
+  /// When a coordinator, or a world, was heard last.
+  std::optional<Clock::time_point> coordinator_heard() const { return coordinator_heard_; }
+  std::optional<Clock::time_point> world_heard() const { return world_heard_; }
+  /// Whether a coordinator was heard that works for somebody else.
+  bool others_heard() const { return others_heard_; }
+
+  /// Returns the participants that take goals and give feedback, ascending; whoever does only one of them looks on.
+  std::vector<std::uint64_t> coordinators() const;
+  /// Whether a goal would reach the coordinator of this participant, and its result us.
+  bool reaches(std::uint64_t coordinator) const;
+
+  /// Sends the goal, whose id becomes goal_id(). Returns whether the middleware took it.
+  bool send(jostle_msgs::msg::Goal goal);
+  bool is_sent() const { return sent_; }
+
+  /// Waits for the result of this goal; nothing if `deadline` or a stop comes first.
+  std::optional<jostle_msgs::msg::GoalResult> wait(Clock::time_point deadline, std::stop_token stop);
+
+  /// Asks the coordinator to end the task. What is lost on the way is not sent again.
+  void cancel();
+
+ private:
+  const std::string goal_id_;
+  const OnFeedback on_feedback_;
+  bool sent_ = false;
+  bool others_heard_ = false;
+  std::optional<Clock::time_point> coordinator_heard_, world_heard_;
+
+  wire::Writer<jostle_msgs::msg::Goal> goal_;
+  wire::Writer<jostle_msgs::msg::Cancel> cancel_;
+  wire::Inbox<jostle_msgs::msg::Feedback> feedback_;
+  wire::Inbox<jostle_msgs::msg::RobotStatus> world_;
+  wire::Inbox<jostle_msgs::msg::GoalResult> results_;
+};
+
+}  // namespace jostle::task

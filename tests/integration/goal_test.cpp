@@ -1,0 +1,70 @@
+// jostle goal: a coordinator and a world that run already, as services of a machine do.
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/run_fixture.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+class Goal : public RunFixture {
+ protected:
+  std::unique_ptr<ProgramProcess> start_coordinator() { return program("jostle_coordinator", {"--pool", "threads"}); }
+  std::unique_ptr<ProgramProcess> start_world() { return program("jostle_sim", {easy}); }
+
+  int ask(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {easy, "--headless"});
+    asked = program("jostle_goal", arguments);
+    return asked->wait(kPatience).value_or(-1);
+  }
+
+  std::unique_ptr<ProgramProcess> asked;
+};
+
+TEST_F(Goal, IsReachedByWhoRunsAlreadyAndAgain) {
+  const auto coordinator = start_coordinator();
+  const auto world = start_world();
+  const std::string file = folder.path() / "result.json";
+
+  ASSERT_EQ(ask({"--wait", "60", "--json", file}), 0) << asked->err();
+
+  EXPECT_THAT(asked->out(), HasSubstr("SUCCESS"));
+  const json report = json::parse(contents(file), nullptr, false);
+  EXPECT_EQ(report["success"], true);
+  EXPECT_EQ(report["controller"], "or");
+  EXPECT_FALSE(report.contains("pool")) << "nothing is known of the coordinator's";
+  EXPECT_EQ(ask({"--wait", "60"}), 0) << "the target is still in the hand: " << asked->err();
+  EXPECT_FALSE(coordinator->code()) << "a coordinator serves one goal after the other";
+}
+
+TEST_F(Goal, OfNobodySaysWhoIsMissingAndHowToStartIt) {
+  EXPECT_EQ(ask({"--wait", "0.5"}), 3);
+  EXPECT_THAT(asked->err(), HasSubstr("jostle coordinator"));
+
+  const auto coordinator = start_coordinator();
+  EXPECT_TRUE(soon(kPatience, [&] {
+    EXPECT_EQ(ask({"--wait", "2"}), 3);
+    return asked->err().find("jostle sim") != std::string::npos;
+  })) << asked->err();
+}
+
+TEST_F(Goal, IsCancelledByCtrlC) {
+  const auto coordinator = start_coordinator();
+  const auto world = start_world();
+  asked = program("jostle_goal", {easy, "--headless", "--wait", "60", "--parameters", endless});
+  ASSERT_TRUE(asked->says("planning", kPatience)) << asked->err();
+
+  asked->signal(SIGINT);
+
+  EXPECT_EQ(asked->wait(kPatience), 130);
+  EXPECT_THAT(asked->err(), HasSubstr("the task was cancelled"));
+  EXPECT_FALSE(coordinator->code());
+}
+
+}  // namespace
+}  // namespace jostle::tests

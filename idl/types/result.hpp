@@ -12,7 +12,7 @@ namespace jostle {
 /// What kind of failure, for code that has to react. People read the message.
 enum class Code {
   kInvalidArgument,  ///< a field has a wrong size, range or name
-  kNotFound,         ///< a file, an object or a robot of that name does not exist
+  kNotFound,         ///< a file, an object or a robot of that name does not exist, or cannot be read
   kUnknownWorld,     ///< no world with that hash was loaded
   kDeadline,         ///< time ran out before the work was done
   kCancelled,        ///< somebody asked to stop

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cassert>
+#include <vector>
+
+#include "idl/files/files.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -38,11 +41,12 @@ void paste(Picture& whole, const Picture& part, int x, int y) {
 }
 
 Result<void> write_png(const std::filesystem::path& file, const Picture& picture) {
-  const unsigned problem = lodepng::encode(file.string(), picture.rgb, static_cast<unsigned>(picture.width),
+  std::vector<unsigned char> bytes;
+  const unsigned problem = lodepng::encode(bytes, picture.rgb, static_cast<unsigned>(picture.width),
                                            static_cast<unsigned>(picture.height), LCT_RGB);
-  if (problem == 0) return {};
-  return Error{Code::kIo, fmt::format("{}: picture of {}x{} not written: {}", file.string(), picture.width,
-                                      picture.height, lodepng_error_text(problem))};
+  if (problem == 0) return files::write(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  return Error{Code::kInternal, fmt::format("{}: picture of {}x{} not encoded: {}", file.string(), picture.width,
+                                            picture.height, lodepng_error_text(problem))};
 }
 
 }  // namespace jostle::physics_pool

@@ -7,13 +7,14 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <numbers>
 #include <set>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "idl/files/files.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -23,16 +24,6 @@ using Point = std::array<double, 3>;
 constexpr std::size_t kHeader = 84, kTriangle = 50;  // bytes of a binary STL
 constexpr std::size_t kDirections = 400, kAxes = 6;  // the first are those of the axes: a mesh keeps its extents
 constexpr double kDamaged = std::numeric_limits<double>::quiet_NaN();
-
-Result<std::string> read_bytes(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::string bytes, piece(1 << 16, ' ');
-  while (in.read(piece.data(), static_cast<std::streamsize>(piece.size())) || in.gcount() > 0) {
-    bytes.append(piece, 0, static_cast<std::size_t>(in.gcount()));
-  }
-  if (!in.eof()) return Error{Code::kIo, file.string() + ": cannot be read"};
-  return bytes;
-}
 
 bool is_binary_stl(const std::string& bytes) {
   if (bytes.size() < kHeader) return false;
@@ -92,7 +83,7 @@ std::set<Point> farthest(const std::set<Point>& points) {
 }  // namespace
 
 Result<std::vector<double>> mesh_vertices(const std::filesystem::path& file) {
-  auto bytes_result = read_bytes(file);
+  auto bytes_result = files::read(file);
   if (!bytes_result) return bytes_result.error();
   const std::string& bytes = *bytes_result;
   std::string ending = file.extension().string();

@@ -4,12 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <cstdlib>
-#include <fstream>
 #include <iterator>
 #include <span>
 #include <sstream>
 #include <system_error>
 
+#include "idl/files/files.hpp"
+#include "idl/text/yaml_fields.hpp"
 #include "physics_pool/robot/pose_text.hpp"
 
 namespace jostle::embedded {
@@ -75,7 +76,11 @@ Joint read_joint(Fields& in) {
 RobotGeom read_geom(Fields& in) {
   RobotGeom geom;
   in.optional("name", geom.name);
-  in.choice<GeomShape>("shape", geom.shape, kShapes);
+  const bool has_shape = in.choice<GeomShape>("shape", geom.shape, kShapes);
+  if (!has_shape) {
+    in.skip({"size", "radius", "height", "vertices", "pose", "mass", "material"});
+    return geom;
+  }
   if (geom.shape == GeomShape::kBox) in.numbers("size", geom.size, true);
   if (geom.shape == GeomShape::kCylinder || geom.shape == GeomShape::kSphere) in.required("radius", geom.radius);
   if (geom.shape == GeomShape::kCylinder) in.required("height", geom.height);
@@ -174,13 +179,6 @@ std::string geom_text(const RobotGeom& geom) {
   return text + fmt::format(", pose: {}, mass: {}, material: {}}}", pose_text(geom.pose), geom.mass, geom.material);
 }
 
-Result<std::string> read_file(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) return Error{Code::kIo, file.string() + ": cannot be read"};
-  return text.str();
-}
-
 Result<RobotModel> parse_robot(std::string_view text, const std::string& origin) {
   return yaml::parse<RobotModel>(text, origin, [&](const YAML::Node& root) -> Result<RobotModel> {
     Fields fields(root, "", origin);
@@ -196,7 +194,7 @@ Result<RobotModel> parse_robot(std::string_view text, const std::string& origin)
 }
 
 Result<RobotModel> load_robot(const fs::path& file, const RobotPath& path) {
-  auto text_result = read_file(file);
+  auto text_result = files::read(file, files::kMostText);
   if (!text_result) return text_result.error();
   if (file.extension() == ".urdf" || file.extension() == ".xacro") return parse_urdf(*text_result, file.string(), path);
   return parse_robot(*text_result, file.string());
@@ -217,6 +215,10 @@ RobotModel read_robot(Fields& fields) {
   fields.required("name", model.name);
   fields.optional("carries_itself", model.carries_itself);
   fields.list("links", [&](Fields& entry) { read_link(entry, model); });
+  if (!fields.is_sound()) {  // the rest names joints and links, some of which are missing now
+    fields.skip({"axes", "hand"});
+    return model;
+  }
   fields.list("axes", [&](Fields& entry) { read_axis(entry, model); });
   fields.section("hand", false, [&](Fields& entry) { read_hand(entry, model); });
   return model;

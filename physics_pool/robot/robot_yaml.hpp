@@ -6,8 +6,12 @@
 #include <string>
 #include <string_view>
 
-#include "idl/text/yaml_fields.hpp"
+#include "idl/types/result.hpp"
 #include "physics_pool/robot/robot_model.hpp"
+
+namespace jostle::yaml {
+class Fields;
+}
 
 namespace jostle::physics_pool {
 

@@ -13,6 +13,7 @@
 
 #include "physics_pool/robot/kinematics.hpp"
 #include "physics_pool/scene/outline.hpp"
+#include "physics_pool/scene/scene_problems.hpp"
 #include "physics_pool/scene/task_kind.hpp"
 
 namespace jostle::physics_pool {
@@ -111,12 +112,6 @@ struct Field {
   std::string shown;  // "objects[3] ('can').pose.x"
 };
 
-Error invalid(const Locate& locate, const Field& field, const std::string& problem) {
-  return {Code::kInvalidArgument, fmt::format("{}: {}: {}", locate(field.path), field.shown, problem)};
-}
-
-bool in_range(double value, double low, double high) { return value >= low && value <= high; }
-
 // A field, its value and the closed range it must lie in.
 struct Range {
   const char* field;
@@ -124,125 +119,204 @@ struct Range {
   const char* unit;
 };
 
-Result<void> check(const Locate& locate, const Field& parent, std::initializer_list<Range> ranges) {
-  for (const Range& r : ranges) {
-    if (in_range(r.value, r.low, r.high)) continue;  // false for NaN
-    return invalid(locate, {parent.path + r.field, parent.shown + r.field},
-                   fmt::format("got {}, wanted {} to {} {}", r.value, r.low, r.high, r.unit));
+// Collects what is wrong with a scene.
+class Inspection {
+ public:
+  explicit Inspection(const Scene& scene) : scene_(scene), bounds_(scene.surface.bounds()) {}
+
+  std::vector<SceneProblem> look() {
+    look_at_surface();
+    const bool is_robot_sound = look_at_robot();
+    look_at_physics();
+    for (std::size_t i = 0; i < scene_.fixtures.size(); ++i) look_at_fixture(i);
+    for (std::size_t i = 0; i < scene_.objects.size(); ++i) look_at_object(i, is_robot_sound);
+    look_at_task(is_robot_sound);
+    return std::move(problems_);
   }
-  return {};
-}
 
-// One of a field's words, or the complaint.
-Result<void> check_word(const Locate& locate, const char* field, const std::string& got,
-                        std::initializer_list<const char*> words) {
-  if (std::ranges::find(words, got) != words.end()) return {};
-  return invalid(locate, {field, field}, fmt::format("got '{}', wanted one of: {}", got, fmt::join(words, ", ")));
-}
+ private:
+  void add(const Field& field, std::string text, bool is_relative = false) {
+    constexpr std::size_t kMost = 1000;  // of a thousand objects in one place every pair is a problem
+    if (problems_.size() >= kMost) return;
+    problems_.push_back(
+        {.path = field.path, .shown = field.shown, .text = std::move(text), .is_relative = is_relative});
+  }
+  void add_relative(const Field& field, std::string text) { add(field, std::move(text), true); }
 
-Result<void> check_surface(const Surface& surface, const Locate& locate) {
-  if (surface.parts.empty()) return invalid(locate, {"surface", "surface"}, "got no part, wanted a rectangle");
-  for (std::size_t i = 0; i < surface.parts.size(); ++i) {
-    const Rectangle& part = surface.parts[i];
-    const std::string field = surface.parts.size() == 1 ? "surface." : fmt::format("surface.parts[{}].", i);
-    if (auto ok = check(locate, {field, field},
-                        {{"size[0]", part.size[0], 0.02, 10, "m"},
-                         {"size[1]", part.size[1], 0.02, 10, "m"},
-                         {"x", part.x, -10, 10, "m"},
-                         {"y", part.y, -10, 10, "m"}});
-        !ok) {
-      return ok;
+  // Whether all lie in their ranges.
+  bool check(const Field& parent, std::initializer_list<Range> ranges, bool is_relative = false) {
+    bool are_fine = true;
+    for (const Range& r : ranges) {
+      if (r.value >= r.low && r.value <= r.high) continue;  // false for NaN
+      are_fine = false;
+      add({parent.path + r.field, parent.shown + r.field},
+          fmt::format("got {}, wanted {} to {} {}", r.value, r.low, r.high, r.unit), is_relative);
     }
-    for (std::size_t k = 0; k < i; ++k) {
-      const Rectangle& other = surface.parts[k];
-      constexpr double kTouch = 1e-9;  // m; parts that share a side do not overlap
-      if (std::min(part.high_x(), other.high_x()) - std::max(part.low_x(), other.low_x()) > kTouch &&
-          std::min(part.high_y(), other.high_y()) - std::max(part.low_y(), other.low_y()) > kTouch) {
-        return invalid(
-            locate, {field, field},
-            fmt::format("overlaps part {}, wanted parts that meet at their sides: what stands on two would be "
-                        "held up twice",
-                        k));
+    return are_fine;
+  }
+
+  void look_at_surface() {
+    const auto& parts = scene_.surface.parts;
+    if (parts.empty()) return add({"surface", "surface"}, "got no part, wanted a rectangle");
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      const std::string field = parts.size() == 1 ? "surface." : fmt::format("surface.parts[{}].", i);
+      check({field, field}, {{"size[0]", parts[i].size[0], 0.02, 10, "m"},
+                             {"size[1]", parts[i].size[1], 0.02, 10, "m"},
+                             {"x", parts[i].x, -10, 10, "m"},
+                             {"y", parts[i].y, -10, 10, "m"}});
+      for (std::size_t k = 0; k < i; ++k) {
+        constexpr double kTouch = 1e-9;  // m; parts that share a side do not overlap
+        const Rectangle &part = parts[i], &other = parts[k];
+        if (std::min(part.high_x(), other.high_x()) - std::max(part.low_x(), other.low_x()) > kTouch &&
+            std::min(part.high_y(), other.high_y()) - std::max(part.low_y(), other.low_y()) > kTouch) {
+          add_relative({field, field},
+                       fmt::format("overlaps part {}, wanted parts that meet at their sides: what stands on two would "
+                                   "be held up twice",
+                                   k));
+        }
       }
     }
   }
-  return {};
-}
 
-// Of an object or a fixture.
-template <class Body>
-Result<void> check_sizes(const Body& body, const Field& parent, const Locate& locate, double largest) {
-  if (body.shape == Shape::kCylinder) {
-    return check(locate, parent,
-                 {{"radius", body.radius, kSmallest, largest, "m"}, {"height", body.height, kSmallest, largest, "m"}});
-  }
-  return check(locate, parent,
-               {{"size[0]", body.size[0], kSmallest, largest, "m"},
-                {"size[1]", body.size[1], kSmallest, largest, "m"},
-                {"size[2]", body.size[2], kSmallest, largest, "m"}});
-}
-
-// `at`: the pose's own name, with a dot behind it.
-Result<void> check_pose(const Pose& pose, const Field& at, const Locate& locate) {
-  const auto& [p, q] = pose;
-  const double length = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-  return check(locate, at,
-               {{"position[0]", p[0], -10, 10, "m"},
-                {"position[1]", p[1], -10, 10, "m"},
-                {"position[2]", p[2], -10, 10, "m"},
-                {"orientation", length, 1 - 1e-6, 1 + 1e-6, "as the squared length of a unit quaternion"}});
-}
-
-Result<void> check_fixture(const Fixture& fixture, const Field& parent, const Locate& locate) {
-  if (fixture.name.empty())
-    return invalid(locate, {parent.path + "name", parent.shown + "name"}, "got '', wanted a name");
-  if (auto ok = check_sizes(fixture, parent, locate, 10); !ok) return ok;
-  return check_pose(fixture.pose, {parent.path + "pose.", parent.shown + "pose."}, locate);
-}
-
-Result<void> check_robot(const SceneRobot& robot, const Locate& locate) {
-  if (auto ok = validate(robot.model); !ok) {
-    const std::string& message = ok.error().message;  // "robot.links[2]…: got …"
-    return Error{ok.error().code,
-                 fmt::format("{}: {}", locate(message.substr(0, message.find_first_of("[:"))), message)};
-  }
-  if (auto ok = check_pose(robot.base, {"robot.base.", "robot.base."}, locate); !ok) return ok;
-  if (as_planar(robot.model) && !(robot.base == Pose{})) {
-    return invalid(
-        locate, {"robot.base", "robot.base"},
-        "got a pose for a robot that moves in the surface's plane, wanted none: robot.start says where it is");
-  }
-  if (robot.q.size() != robot.model.joints.size()) {
-    return invalid(locate, {"robot.start", "robot.start"},
-                   fmt::format("got {} joints, wanted {}", robot.q.size(), robot.model.joints.size()));
-  }
-  for (std::size_t i = 0; i < robot.q.size(); ++i) {
-    const Joint& joint = robot.model.joints[i];
-    const std::string field = "robot.start." + joint.name;
-    if (auto ok = check(locate, {field, field},
-                        {{"", robot.q[i], std::max(joint.low, -10.0), std::min(joint.high, 10.0),
-                          joint.kind == JointKind::kSlide ? "m" : "rad"}});
-        !ok) {
-      return ok;
+  // Of an object or a fixture.
+  template <class Body>
+  void check_sizes(const Body& body, const Field& parent, double largest) {
+    if (body.shape == Shape::kCylinder) {
+      check(parent,
+            {{"radius", body.radius, kSmallest, largest, "m"}, {"height", body.height, kSmallest, largest, "m"}});
+    } else {
+      check(parent, {{"size[0]", body.size[0], kSmallest, largest, "m"},
+                     {"size[1]", body.size[1], kSmallest, largest, "m"},
+                     {"size[2]", body.size[2], kSmallest, largest, "m"}});
     }
   }
-  return {};
-}
 
-Result<void> check_discs(const Scene& scene, const Locate& locate) {
-  const Rectangle bounds = scene.surface.bounds();
-  const auto check_disc = [&](const std::string& field, const Disc& disc) {
-    return check(locate, {field, field},
-                 {{".x", disc.x, bounds.low_x(), bounds.high_x(), "m, on the surface"},
-                  {".y", disc.y, bounds.low_y(), bounds.high_y(), "m, on the surface"},
-                  {".radius", disc.radius, kSmallest, kLargest, "m"}});
-  };
-  if (find_task_kind(scene.task.kind)->has_goal) {
-    if (auto ok = check_disc("task.goal", scene.task.goal); !ok) return ok;
+  // `at`: the pose's own name, with a dot behind it.
+  void check_pose(const Pose& pose, const Field& at) {
+    const auto& [p, q] = pose;
+    const double length = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    check(at, {{"position[0]", p[0], -10, 10, "m"},
+               {"position[1]", p[1], -10, 10, "m"},
+               {"position[2]", p[2], -10, 10, "m"},
+               {"orientation", length, 1 - 1e-6, 1 + 1e-6, "as the squared length of a unit quaternion"}});
   }
-  if (!scene.task.obstacle) return {};
-  return check_disc("task.obstacle", *scene.task.obstacle);
-}
+
+  void check_name(const std::string& name, const Field& parent) {
+    const Field field{parent.path + "name", parent.shown + "name"};
+    if (name.empty()) return add(field, "got '', wanted a name");
+    if (!names_.insert(name).second) add(field, "already taken, wanted a unique name");
+  }
+
+  void look_at_fixture(std::size_t i) {
+    const Fixture& fixture = scene_.fixtures[i];
+    const Field parent{fmt::format("fixtures[{}].", i), fmt::format("fixtures[{}] ('{}').", i, fixture.name)};
+    check_name(fixture.name, parent);
+    check_sizes(fixture, parent, 10);
+    check_pose(fixture.pose, {parent.path + "pose.", parent.shown + "pose."});
+  }
+
+  // Whether its model and its joints are such that its parts have places.
+  bool look_at_robot() {
+    const SceneRobot& robot = scene_.robot;
+    if (auto ok = validate(robot.model); !ok) {
+      const std::string& message = ok.error().message;  // "robot.links[2]…: got …"
+      const std::size_t end = message.find(": ");
+      const std::string shown = message.substr(0, end);
+      add_relative({shown.substr(0, shown.find_first_of("[:")), shown},
+                   end == message.npos ? "" : message.substr(end + 2));
+      return false;
+    }
+    check_pose(robot.base, {"robot.base.", "robot.base."});
+    if (as_planar(robot.model) && !(robot.base == Pose{})) {
+      add({"robot.base", "robot.base"},
+          "got a pose for a robot that moves in the surface's plane, wanted none: robot.start says where it is");
+    }
+    if (robot.q.size() != robot.model.joints.size()) {
+      add({"robot.start", "robot.start"},
+          fmt::format("got {} joints, wanted {}", robot.q.size(), robot.model.joints.size()));
+      return false;
+    }
+    bool are_fine = true;
+    for (std::size_t i = 0; i < robot.q.size(); ++i) {
+      const Joint& joint = robot.model.joints[i];
+      const std::string field = "robot.start." + joint.name;
+      are_fine &= check({field, field}, {{"", robot.q[i], std::max(joint.low, -10.0), std::min(joint.high, 10.0),
+                                          joint.kind == JointKind::kSlide ? "m" : "rad"}});
+    }
+    return are_fine;
+  }
+
+  void look_at_physics() {
+    const ScenePhysics& physics = scene_.physics;
+    const Field integrator{"physics.integrator", "physics.integrator"};
+    if (physics.integrator != "euler" && physics.integrator != "rk4")
+      add(integrator, fmt::format("got '{}', wanted one of: euler, rk4", physics.integrator));
+    if (scene_.robot.model.carries_itself && physics.integrator == "rk4") {
+      add(integrator, "got rk4 for a robot that carries itself, wanted euler: its weight is balanced once per step");
+    }
+    check({"physics.", "physics."}, {{"time_step", physics.time_step, 1e-4, 0.02, "s"},
+                                     {"iterations", double(physics.iterations), 1, 1000, ""},
+                                     {"tolerance", physics.tolerance, 0, 1, ""}});
+  }
+
+  void look_at_object(std::size_t i, bool is_robot_sound) {
+    const SceneObject& object = scene_.objects[i];
+    const Field parent{fmt::format("objects[{}].", i), fmt::format("objects[{}] ('{}').", i, object.name)};
+    const Field pose{parent.path + "pose", parent.shown + "pose"};
+    check_name(object.name, parent);
+    check_sizes(object, parent, kLargest);
+    check(parent, {{"mass", object.mass, 1e-4, 100, "kg"},
+                   {"friction", object.friction, 0, 5, ""},
+                   {"pose.yaw", object.yaw, -7, 7, "rad"}});
+    const bool is_near = check(parent,
+                               {{"pose.x", object.x, bounds_.low_x(), bounds_.high_x(), "m, on the surface"},
+                                {"pose.y", object.y, bounds_.low_y(), bounds_.high_y(), "m, on the surface"}},
+                               true);
+    if (is_near && !scene_.surface.carries(object.x, object.y)) {
+      add_relative(pose, fmt::format("({}, {}) is on no part of the surface, wanted one", object.x, object.y));
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      const SceneObject& other = scene_.objects[j];
+      if (!overlap(object, other)) continue;
+      add_relative(pose, fmt::format("inside object '{}' by {:.1f} mm, wanted a free place", other.name,
+                                     -1e3 * footprint_gap(footprint(object), footprint(other))));
+    }
+    if (is_robot_sound && overlaps_robot(scene_, object)) {
+      add_relative(pose, "inside the robot at its start, wanted a free place; move robot.start or the object");
+    }
+  }
+
+  void look_at_task(bool is_robot_sound) {
+    const SceneTask& task = scene_.task;
+    const TaskKind* kind = find_task_kind(task.kind);
+    if (!kind) {
+      std::vector<std::string> known;
+      for (const TaskKind* k : task_kinds()) known.emplace_back(k->name);
+      add({"task.kind", "task.kind"}, fmt::format("got '{}', wanted one of: {}", task.kind, fmt::join(known, ", ")));
+    } else if (is_robot_sound) {
+      if (const std::string misfit = kind->misfit(scene_); !misfit.empty())
+        add_relative({"task.kind", "task.kind"}, misfit);
+    }
+    if (scene_.target() < 0) {
+      add_relative({"task.target", "task.target"}, fmt::format("got '{}', wanted the name of an object", task.target));
+    }
+    if (kind && kind->has_goal) check_disc("task.goal", task.goal);
+    if (task.obstacle) check_disc("task.obstacle", *task.obstacle);
+  }
+
+  void check_disc(const std::string& field, const Disc& disc) {
+    check({field, field}, {{".radius", disc.radius, kSmallest, kLargest, "m"}});
+    check({field, field},
+          {{".x", disc.x, bounds_.low_x(), bounds_.high_x(), "m, on the surface"},
+           {".y", disc.y, bounds_.low_y(), bounds_.high_y(), "m, on the surface"}},
+          true);
+  }
+
+  const Scene& scene_;
+  const Rectangle bounds_;
+  std::set<std::string> names_;
+  std::vector<SceneProblem> problems_;
+};
 
 constexpr double kPusherClearance = 0.001;  // m above the surface
 
@@ -319,79 +393,19 @@ Result<void> validate(const Scene& scene, const std::string& origin) {
 }
 
 Result<void> validate(const Scene& scene, const Locate& locate) {
-  if (auto ok = check_word(locate, "physics.integrator", scene.physics.integrator, {"euler", "rk4"}); !ok) return ok;
-  if (auto ok = check_surface(scene.surface, locate); !ok) return ok;
-  if (auto ok = check_robot(scene.robot, locate); !ok) return ok;
-  if (scene.robot.model.carries_itself && scene.physics.integrator == "rk4") {
-    return invalid(locate, {"physics.integrator", "physics.integrator"},
-                   "got rk4 for a robot that carries itself, wanted euler: its weight is balanced once per step");
+  const std::vector<SceneProblem> problems = scene_problems(scene);
+  if (problems.empty()) return {};
+  constexpr std::size_t kMostTold = 20;
+  std::string message;
+  for (std::size_t i = 0; i < std::min(problems.size(), kMostTold); ++i) {
+    const auto& [path, shown, text, is_relative] = problems[i];
+    message += fmt::format("{}{}: {}: {}", i == 0 ? "" : "\n", locate(path), shown, text);
   }
-  if (auto ok = check(locate, {},
-                      {{"physics.time_step", scene.physics.time_step, 1e-4, 0.02, "s"},
-                       {"physics.iterations", double(scene.physics.iterations), 1, 1000, ""},
-                       {"physics.tolerance", scene.physics.tolerance, 0, 1, ""}});
-      !ok) {
-    return ok;
-  }
-  const Rectangle bounds = scene.surface.bounds();
-  std::set<std::string> names;
-  for (std::size_t i = 0; i < scene.fixtures.size(); ++i) {
-    const Fixture& fixture = scene.fixtures[i];
-    const Field parent{fmt::format("fixtures[{}].", i), fmt::format("fixtures[{}] ('{}').", i, fixture.name)};
-    if (auto ok = check_fixture(fixture, parent, locate); !ok) return ok;
-    if (!names.insert(fixture.name).second) {
-      return invalid(locate, {parent.path + "name", parent.shown + "name"}, "already taken, wanted a unique name");
-    }
-  }
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    const SceneObject& object = scene.objects[i];
-    const Field parent{fmt::format("objects[{}].", i), fmt::format("objects[{}] ('{}').", i, object.name)};
-    const auto invalid_at = [&](const char* field, const std::string& problem) {
-      return invalid(locate, {parent.path + field, parent.shown + field}, problem);
-    };
-    if (object.name.empty()) return invalid_at("name", "got '', wanted a name");
-    if (!names.insert(object.name).second) {
-      return invalid_at("name", "already taken, wanted a unique name");
-    }
-    if (auto ok = check_sizes(object, parent, locate, kLargest); !ok) return ok;
-    if (auto ok = check(locate, parent,
-                        {{"mass", object.mass, 1e-4, 100, "kg"},
-                         {"friction", object.friction, 0, 5, ""},
-                         {"pose.x", object.x, bounds.low_x(), bounds.high_x(), "m, on the surface"},
-                         {"pose.y", object.y, bounds.low_y(), bounds.high_y(), "m, on the surface"},
-                         {"pose.yaw", object.yaw, -7, 7, "rad"}});
-        !ok) {
-      return ok;
-    }
-    if (!scene.surface.carries(object.x, object.y)) {
-      return invalid_at("pose", fmt::format("({}, {}) is on no part of the surface, wanted one", object.x, object.y));
-    }
-    for (std::size_t j = 0; j < i; ++j) {
-      if (!overlap(object, scene.objects[j])) continue;
-      return invalid_at("pose",
-                        fmt::format("inside object '{}' by {:.1f} mm, wanted a free place", scene.objects[j].name,
-                                    -1e3 * footprint_gap(footprint(object), footprint(scene.objects[j]))));
-    }
-    if (overlaps_robot(scene, object)) {
-      return invalid_at("pose", "inside the robot at its start, wanted a free place; move robot.start or the object");
-    }
-  }
-  const TaskKind* kind = find_task_kind(scene.task.kind);
-  if (!kind) {
-    std::vector<std::string> known;
-    for (const TaskKind* k : task_kinds()) known.emplace_back(k->name);
-    return invalid(locate, {"task.kind", "task.kind"},
-                   fmt::format("got '{}', wanted one of: {}", scene.task.kind, fmt::join(known, ", ")));
-  }
-  if (const std::string misfit = kind->misfit(scene); !misfit.empty()) {
-    return invalid(locate, {"task.kind", "task.kind"}, misfit);
-  }
-  if (scene.target() < 0) {
-    return invalid(locate, {"task.target", "task.target"},
-                   fmt::format("got '{}', wanted the name of an object", scene.task.target));
-  }
-  return check_discs(scene, locate);
+  if (problems.size() > kMostTold) message += fmt::format("\nand {} more", problems.size() - kMostTold);
+  return Error{Code::kInvalidArgument, message};
 }
+
+std::vector<SceneProblem> scene_problems(const Scene& scene) { return Inspection(scene).look(); }
 
 StateLayout layout_of(const Scene& scene) {
   StateLayout layout;

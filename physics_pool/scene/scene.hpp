@@ -114,7 +114,9 @@ struct Scene {
 
 /// Reads and checks a scene of format 2, or 1 (scenes/README.md has both).
 /// `robots`: where a robot that the text names is looked for; by default only built-in models are found.
-/// Errors   kIo, kNotFound, kInvalidArgument; the message names file, line, field, got and wanted.
+/// `file`: - is standard input. Texts have at most files::kMostText bytes.
+/// Errors   kNotFound, kInvalidArgument; the message names file, line, field, got and wanted of all mistakes, as far as
+/// they do not follow from one another.
 Result<Scene> load_scene(const std::filesystem::path& file);
 Result<Scene> parse_scene(std::string_view yaml, const std::string& origin, const RobotPath& robots = {});
 
@@ -129,7 +131,7 @@ std::string to_yaml(const Scene& scene, RobotText robot = RobotText::kWhole);
 Hash scene_hash(const Scene& scene);
 
 /// Checks that sizes and masses are in range, names unique, target and robot known, nothing
-/// inside anything else, everything on the surface.
+/// inside anything else, everything on the surface. The Error has a line for everything that is wrong.
 Result<void> validate(const Scene& scene, const std::string& origin);
 
 /// Where a field such as "objects[3].pose.x" came from, for messages: a file,

@@ -4,13 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
-#include <sstream>
 
+#include "idl/files/files.hpp"
 #include "idl/text/yaml_fields.hpp"
 #include "physics_pool/robot/pose_text.hpp"
 #include "physics_pool/scene/scene.hpp"
+#include "physics_pool/scene/scene_problems.hpp"
 #include "physics_pool/scene/task_kind.hpp"
 
 namespace jostle::physics_pool {
@@ -87,7 +87,8 @@ void read_pose(Fields& in, Pose& pose) {
 // Of an object or a fixture.
 template <class Body>
 void read_shape(Fields& in, Body& body) {
-  in.choice<Shape>("shape", body.shape, {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}});
+  if (!in.choice<Shape>("shape", body.shape, {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}}))
+    return in.skip({"size", "radius", "height"});
   if (body.shape == Shape::kBox) {
     in.numbers("size", body.size, true);
   } else {
@@ -129,12 +130,11 @@ void read_robot_2(Fields& fields, Scene& scene, const RobotPath& robots) {
   }
 }
 
-Scene read(const YAML::Node& root, const std::string& origin, const RobotPath& robots) {
+Scene read(Fields& fields, const RobotPath& robots) {
   Scene scene;
-  Fields fields(root, "", origin);
   int version = 0;
   fields.required("jostle_scene", version);
-  if (version != 1 && version != 2)
+  if (fields.is_sound() && version != 1 && version != 2)
     fields.refuse("jostle_scene", fmt::format("got version {}, wanted 2 or 1", version));
   fields.optional("name", scene.name);
   fields.section("surface", false, [&](Fields& surface) {
@@ -171,8 +171,17 @@ Scene read(const YAML::Node& root, const std::string& origin, const RobotPath& r
     physics.optional("iterations", scene.physics.iterations);
     physics.optional("tolerance", scene.physics.tolerance);
   });
-  fields.finish();
   return scene;
+}
+
+// Adds what is wrong with the values, but for what may follow from what could not be read.
+void add_problems(const YAML::Node& root, const Scene& scene, yaml::Complaints& complaints) {
+  const yaml::Complaints unreadable = complaints;
+  const bool is_whole = unreadable.empty();
+  for (const SceneProblem& problem : scene_problems(scene)) {
+    if (problem.is_relative ? is_whole : unreadable.is_sound(problem.path))
+      complaints.add(yaml::line_of(root, problem.path), problem.path, problem.text, problem.shown);
+  }
 }
 
 // The lines of `read_shape`.
@@ -186,24 +195,23 @@ std::string shape_text(const Body& body) {
 
 Result<Scene> parse_scene(std::string_view text, const std::string& origin, const RobotPath& robots) {
   return yaml::parse<Scene>(text, origin, [&](const YAML::Node& root) -> Result<Scene> {
-    Scene scene = read(root, origin, robots);
-    const auto locate = [&](std::string_view field) {
-      return fmt::format("{}:{}", origin, yaml::line_of(root, field));
-    };
-    if (auto ok = validate(scene, locate); !ok) return ok.error();
+    Fields fields(root, "", origin);
+    Scene scene = read(fields, robots);
+    add_problems(root, scene, fields.complaints());
+    fields.finish();
     return scene;
   });
 }
 
 Result<Scene> load_scene(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) {
-    return Error{Code::kIo, fmt::format("{}: cannot be read, wanted a scene file; `jostle scene "
-                                        "generate` makes one",
-                                        file.string())};
+  const bool is_input = files::is_standard(file);
+  const auto text_result = files::read(file, files::kMostText);
+  if (!text_result) {
+    return Error{text_result.error().code,
+                 text_result.error().message + "; wanted a scene file, which `jostle scene generate` makes"};
   }
-  return parse_scene(text.str(), file.string(), robot_path(file.parent_path()));
+  return parse_scene(*text_result, is_input ? "standard input" : file.string(),
+                     robot_path(is_input ? "" : file.parent_path()));
 }
 
 std::string to_yaml(const Scene& scene, RobotText robot_text_as) {

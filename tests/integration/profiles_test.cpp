@@ -310,7 +310,7 @@ TEST(BrokenProfilesOf, AProgramEndItAsBadInput) {
 TEST(MissingProfiles, AreNamed) {
   const auto result = wire::load_profiles({.path = "/nowhere/profiles.xml"});
   ASSERT_FALSE(result);
-  EXPECT_THAT(result.error().message, HasSubstr("/nowhere/profiles.xml: cannot be read"));
+  EXPECT_THAT(result.error().message, HasSubstr("/nowhere/profiles.xml: missing"));
 }
 
 }  // namespace

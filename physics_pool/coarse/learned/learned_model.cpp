@@ -120,10 +120,11 @@ std::optional<std::string> objection(const Network& network, const Scene& scene)
 Result<std::unique_ptr<CoarseModel>> make_learned_model(const Network& network, const Scene& scene,
                                                         const std::string& origin) {
   if (const auto why = objection(network, scene)) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}: does not fit scene '{}': {}; choose another coarse model, or train one "
-                             "with jostle train-coarse",
-                             origin, scene.name, *why)};
+    return Error{
+        Code::kInvalidArgument,
+        fmt::format("{}: does not fit scene '{}': {}; choose another coarse model: kinematic, limit-surface or "
+                    "planar (jostle train-coarse makes models of cylinders only)",
+                    origin, scene.name, *why)};
   }
   return std::unique_ptr<CoarseModel>(new LearnedModel(network, static_cast<int>(scene.objects.size())));
 }

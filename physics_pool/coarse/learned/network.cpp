@@ -6,11 +6,12 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <functional>
 #include <iterator>
 #include <optional>
 #include <string_view>
+
+#include "idl/files/files.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -88,11 +89,11 @@ class Parser {
   }
 
   std::optional<Error> binary(std::string_view what, std::size_t count, std::vector<float>& values) {
-    values.resize(count);
     if (rest_.size() < count * sizeof(float)) {
       return wrong(what,
                    fmt::format("the file is cut off: got {} bytes, wanted {}", rest_.size(), count * sizeof(float)));
     }
+    values.resize(count);  // not before: a line may ask for more than any machine has
     std::memcpy(values.data(), rest_.data(), count * sizeof(float));
     rest_.remove_prefix(count * sizeof(float));
     for (std::size_t i = 0; i < count; ++i) {
@@ -183,21 +184,10 @@ Result<Network> parse_network(std::string_view content, const std::string& origi
 }
 
 Result<Network> load_network(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary | std::ios::ate);
-  const auto refused = [&](const std::string& why) {
-    return Error{Code::kIo, fmt::format("{}: {}", file.string(), why)};
-  };
-  if (!in) return refused("cannot be opened; jostle train-coarse fit writes such a file");
-  const auto bytes = in.tellg();
-  if (bytes < 0) return refused("cannot be read");
-  if (static_cast<std::size_t>(bytes) > kMaxBytes) {
-    return Error{Code::kInvalidArgument, fmt::format("{}: size: got {} bytes, wanted at most {}; {}", file.string(),
-                                                     static_cast<std::size_t>(bytes), kMaxBytes, kRemedy)};
-  }
-  std::string content(static_cast<std::size_t>(bytes), '\0');
-  in.seekg(0);
-  if (!in.read(content.data(), bytes)) return refused("cannot be read");
-  return parse_network(content, file.string());
+  const auto content_result = files::read(file, kMaxBytes);
+  if (!content_result)
+    return Error{content_result.error().code, fmt::format("{}; {}", content_result.error().message, kRemedy)};
+  return parse_network(*content_result, file.string());
 }
 
 std::string to_file(const Network& network) {

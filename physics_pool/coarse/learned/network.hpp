@@ -34,7 +34,7 @@ struct Network {
   std::vector<NetworkLayer> layers;            ///< first takes kInputs, last gives kOutputs
 };
 
-/// Errors   kIo               the file cannot be read
+/// Errors   kNotFound         the file is missing, or cannot be read
 ///          kInvalidArgument  it is no network file, of another version, cut off, too long, or
 ///                            a value is out of range; says file, field, got, wanted, remedy
 Result<Network> load_network(const std::filesystem::path& file);

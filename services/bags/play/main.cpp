@@ -170,6 +170,10 @@ int main(int argc, char** argv) {
   if (*subscribers && subscribers->results().front().empty()) options.subscribers = 1;
   if (!*bag && !*controls)
     return fail({Code::kInvalidArgument, "got no bag, wanted one, or --control; `jostle play --help` says more"});
+  if (auto ok = common::check_outputs({{.option = "--json", .path = arguments.json, .endings = {}}}); !ok) {
+    fmt::print(stderr, "jostle play: {}\n", ok.error().message);
+    return common::exit_code_of(ok.error());
+  }
   common::die_with_parent(process.parent);
   const common::StopSignal signal;
   options.domain = process.domain;

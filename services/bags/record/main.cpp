@@ -185,6 +185,10 @@ int main(int argc, char** argv) {
       "Exit codes: 0 recorded, 2 bad input, 3 the disk is full or a part of the system failed. What was lost is\n"
       "counted by topic, shown, and stored in the bag; losses change no exit code.");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
+  if (auto ok = common::check_outputs({{.option = "--json", .path = arguments.json, .endings = {}}}); !ok) {
+    fmt::print(stderr, "jostle record: {}\n", ok.error().message);
+    return common::exit_code_of(ok.error());
+  }
   common::die_with_parent(process.parent);
   options.domain = process.domain;
   options.folder = arguments.folder.empty() ? now_as("record_%Y_%m_%d-%H_%M_%S") : arguments.folder;

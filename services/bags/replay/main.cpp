@@ -9,6 +9,7 @@
 #include "services/bags/replay/report.hpp"
 #include "services/common/process/command_line.hpp"
 #include "services/common/process/cores.hpp"
+#include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/results/results.hpp"
 
@@ -23,9 +24,7 @@ struct Arguments {
 
 int fail(const Error& error) {
   fmt::print(stderr, "jostle replay: {}\n", error.message);
-  if (error.code == Code::kCancelled) return common::kExitInterrupted;
-  return error.code == Code::kInvalidArgument || error.code == Code::kNotFound ? common::kExitUsage
-                                                                               : common::kExitBroken;
+  return common::exit_code_of(error);
 }
 
 // The runs that were asked for.
@@ -94,6 +93,8 @@ int main(int argc, char** argv) {
   app.add_option("--json", arguments.json, "File for the comparison");
   app.footer("Exit codes: 0 bit-equal, 1 not, 2 bad input, 3 a part of the system failed, 130 interrupted.");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
+  if (auto ok = common::check_outputs({{.option = "--json", .path = arguments.json, .endings = {}}}); !ok)
+    return fail(ok.error());
   const common::StopSignal signal;
   return perform(std::move(arguments), signal.token());
 }

@@ -19,7 +19,7 @@ inline constexpr std::array kColours{"#000000", "#E69F00", "#56B4E9", "#009E73",
 std::string quoted(const std::string& text);
 
 /// Runs a script that draws `picture`, whose folder it makes.
-/// Errors   kNotFound  gnuplot is not installed
+/// Errors   kUnavailable  gnuplot is not installed
 ///          kIo        the file cannot be written; gnuplot's own words
 Result<void> run_gnuplot(const std::filesystem::path& picture, const std::string& script);
 

@@ -56,15 +56,20 @@ Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
   sigset_t none;
   sigemptyset(&none);  // ours are blocked, see StopSignal
   posix_spawnattr_setsigmask(&attributes, &none);
+  sigset_t ordinary;
+  sigemptyset(&ordinary);
+  sigaddset(&ordinary, SIGPIPE);  // ours is ignored, see guard_standard_streams
+  posix_spawnattr_setsigdefault(&attributes, &ordinary);
   posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
 
   pid_t pid = -1;
   const int problem = posix_spawn(&pid, program.c_str(), &files, &attributes, argv.data(), environ);
   posix_spawn_file_actions_destroy(&files);
   posix_spawnattr_destroy(&attributes);
   if (problem != 0) {
-    return Error{Code::kNotFound, fmt::format("{}: cannot be started: {}", program.string(), std::strerror(problem))};
+    return Error{Code::kUnavailable,
+                 fmt::format("{}: cannot be started: {}", program.string(), std::strerror(problem))};
   }
   return ChildProcess(pid, log);
 }
@@ -158,7 +163,7 @@ Result<void> run_tool(const std::string& name, const std::string& package, const
     if (end.ok()) return {};
     return Error{Code::kIo, fmt::format("{}: {}\n{}", name, end.text(), child_result->last_words())};
   }
-  return Error{Code::kNotFound, fmt::format("{}: not found on PATH; install the package {}", name, package)};
+  return Error{Code::kUnavailable, fmt::format("{}: not found on PATH; install the package {}", name, package)};
 }
 
 }  // namespace jostle::common

@@ -30,7 +30,7 @@ struct ExitStatus {
 /// Destroying it ends the child: SIGTERM, and SIGKILL two seconds after the first one.
 class ChildProcess {
  public:
-  /// Error kNotFound if the program cannot be started; names it.
+  /// Error kUnavailable if the program cannot be started; names it.
   static Result<ChildProcess> start(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                                     const std::filesystem::path& log);
 
@@ -70,8 +70,8 @@ class ChildProcess {
 };
 
 /// Runs a program of the system to its end; it writes to `log`.
-/// Errors   kNotFound  it is not on PATH; names the Debian package that has it
-///          kIo        it failed; how, and its last words
+/// Errors   kUnavailable  it is not on PATH; names the Debian package that has it
+///          kIo           it failed; how, and its last words
 Result<void> run_tool(const std::string& name, const std::string& package, const std::vector<std::string>& arguments,
                       const std::filesystem::path& log);
 

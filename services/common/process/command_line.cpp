@@ -9,6 +9,7 @@
 #include <regex>
 #include <sstream>
 
+#include "services/common/process/exit_codes.hpp"
 #include "services/common/process/nearest.hpp"
 #include "services/common/process/program.hpp"
 
@@ -399,11 +400,7 @@ std::string manual_page(const CLI::App& app, const std::string& purpose) {
 void document_exit_codes(CLI::App& app) {
   const std::string footer = app.get_footer();
   if (footer.find("Exit codes:") != std::string::npos) return;
-  app.footer(
-      fmt::format("{}{}Exit codes: {} done, {} the work failed, {} wrong arguments or a bad file, {} a part of "
-                  "the system failed,\n{} interrupted.",
-                  footer, footer.empty() ? "" : "\n", static_cast<int>(kExitOk), static_cast<int>(kExitFailed),
-                  static_cast<int>(kExitUsage), static_cast<int>(kExitBroken), static_cast<int>(kExitInterrupted)));
+  app.footer(footer + (footer.empty() ? "" : "\n") + exit_codes_help());
 }
 
 }  // namespace jostle::common

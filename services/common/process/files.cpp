@@ -1,16 +1,5 @@
 #include "services/common/process/files.hpp"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
-#include <fstream>
-#include <sstream>
-
-#include "services/common/process/program.hpp"
-
 namespace jostle::common {
 
 namespace fs = std::filesystem;
@@ -32,40 +21,10 @@ std::string coarse_model_name(const std::string& name) {
   return name == "learned" ? "learned:" + data_file("models/coarse-sliders.net").string() : name;
 }
 
-Result<std::string> read_text(const fs::path& file) {
-  std::ifstream in(file);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) {
-    return Error{Code::kIo, fmt::format("{}: cannot be read", file.string())};
-  }
-  return text.str();
-}
+Result<std::string> read_text(const fs::path& file) { return files::read(file); }
 
-Result<void> write_text(const fs::path& file, const std::string& text) {
-  std::error_code ignored;
-  if (file.has_parent_path()) fs::create_directories(file.parent_path(), ignored);
-  const fs::path draft = file.string() + fmt::format(".{}", ::getpid());
-  std::ofstream out(draft);
-  out << text;
-  out.close();
-  std::error_code problem;
-  if (out) fs::rename(draft, file, problem);
-  if (out && !problem) return {};
-  fs::remove(draft, ignored);
-  return Error{Code::kIo,
-               fmt::format("{}: cannot be written{}", file.string(), problem ? ": " + problem.message() : "")};
-}
+Result<void> write_text(const fs::path& file, const std::string& text) { return files::write(file, text); }
 
-Result<fs::path> make_temporary_folder(const std::string& purpose) {
-  std::error_code problem;
-  const fs::path parent = fs::temp_directory_path(problem);
-  if (problem) return Error{Code::kIo, fmt::format("TMPDIR: got '{}', wanted a folder", parent.string())};
-  std::string name = (parent / fmt::format("jostle-{}-XXXXXX", purpose)).string();
-  if (mkdtemp(name.data())) {
-    remove_at_abrupt_end(name);
-    return fs::path(name);
-  }
-  return Error{Code::kIo, fmt::format("{}: cannot be made: {}", name, std::strerror(errno))};
-}
+Result<void> check_outputs(const std::vector<files::Output>& outputs) { return files::check_outputs(outputs); }
 
 }  // namespace jostle::common

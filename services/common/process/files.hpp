@@ -1,11 +1,14 @@
 #pragma once
 /// \file
-/// Where programs find what lies beside them.
+/// Where programs find what lies beside them, and how they read and write files.
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
+#include "idl/files/files.hpp"
 #include "idl/types/result.hpp"
+#include "services/common/process/temporary_folder.hpp"
 
 namespace jostle::common {
 
@@ -26,15 +29,9 @@ std::filesystem::path data_file(const std::string& name);
 /// comes along, models/coarse-sliders.net.
 std::string coarse_model_name(const std::string& name);
 
-/// Reads a whole file. Error kIo naming the file.
+/// See idl/files/files.hpp, also for `-`, pipes, devices and links.
 Result<std::string> read_text(const std::filesystem::path& file);
-
-/// Writes a whole file. Makes missing folders; replaces the file in one step, so that a reader
-/// never sees half of it. Error kIo naming the file.
 Result<void> write_text(const std::filesystem::path& file, const std::string& text);
-
-/// Makes a folder that only this user can read, for its caller to remove; `purpose`
-/// becomes part of its name. Error kIo naming it.
-Result<std::filesystem::path> make_temporary_folder(const std::string& purpose);
+Result<void> check_outputs(const std::vector<files::Output>& outputs);
 
 }  // namespace jostle::common

@@ -12,16 +12,21 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <sstream>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "idl/types/number.hpp"
 #include "services/common/process/command_line.hpp"
 #include "services/common/process/domain.hpp"
 #include "services/common/process/environment.hpp"
+#include "services/common/process/standard_streams.hpp"
+#include "services/common/terminal/terminal.hpp"
 
 namespace jostle::common {
 namespace {
@@ -38,8 +43,13 @@ sigset_t stop_signals() {
   sigemptyset(&set);
   sigaddset(&set, SIGINT);
   sigaddset(&set, SIGTERM);
+  struct sigaction hangup {};
+  const bool is_ignored = sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler == SIG_IGN;  // nohup
+  if (!is_ignored) sigaddset(&set, SIGHUP);
   return set;
 }
+
+std::atomic<bool> has_stop_signal = false;
 
 // What goes when the process ends all of a sudden.
 struct Leftovers {
@@ -74,6 +84,49 @@ void warn_of_ports(std::optional<int> wanted) {
     fmt::print(stderr, "warning: DDS domain {}: {}; better: {}\n", *domain_result, trouble->finding, trouble->remedy);
 }
 
+// Without a minus and leading zeros, with which the parser would read octal numbers.
+std::string decimal(std::string text) {
+  const std::size_t sign = text.starts_with('-') ? 1 : 0;
+  const std::size_t first = text.find_first_not_of('0', sign);
+  text.erase(sign, std::min(first, text.size() - 1) - sign);
+  return text;
+}
+
+std::string check_whole(std::string& text, bool is_signed) {
+  const std::string plain(without_plus(text));
+  const bool has_digits = plain.find_first_of("0123456789") != plain.npos;
+  const std::size_t first = is_signed && plain.starts_with('-') ? 1 : 0;
+  if (!has_digits || plain.find_first_not_of("0123456789", first) != plain.npos)
+    return fmt::format("got '{}', wanted a whole number{}", text, is_signed ? "" : ", 0 or more");
+  text = decimal(plain);
+  return "";
+}
+
+std::string check_finite(std::string& text) {
+  const std::string plain(without_plus(text));
+  if (!parse_number(plain)) return fmt::format("got '{}', wanted a finite number", text);
+  text = plain;
+  return "";
+}
+
+std::string check_filled(std::string& text) { return text.empty() ? "got '', wanted a text" : ""; }
+
+// Adds to every option of a program what its type alone asks for.
+void check_values(CLI::App& app) {
+  const auto checked = [](CLI::Option& option, const std::function<std::string(std::string&)>& check) {
+    option.transform(CLI::Validator(check, ""));  // before the option's own checks; "": the help stays what it is
+  };
+  for (CLI::Option* option : app.get_options([](CLI::Option* o) { return o->get_items_expected_max() > 0; })) {
+    const std::string type = option->get_type_name(), name = option->get_name();
+    if (type.starts_with("UINT")) checked(*option, [](std::string& text) { return check_whole(text, false); });
+    if (type.starts_with("INT")) checked(*option, [](std::string& text) { return check_whole(text, true); });
+    if (type.starts_with("FLOAT")) checked(*option, check_finite);
+    const bool may_be_empty = name == "--discovery" || name == "--namespace" || name == "--secure";
+    if (type.starts_with("TEXT") && !may_be_empty) checked(*option, check_filled);
+  }
+  for (CLI::App* command : app.get_subcommands({})) check_values(*command);
+}
+
 }  // namespace
 
 // Blocked in every thread and waited for in one: a stop request takes locks,
@@ -81,6 +134,7 @@ void warn_of_ports(std::optional<int> wanted) {
 StopSignal::StopSignal(std::chrono::milliseconds patience) {
   const sigset_t set = stop_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  has_stop_signal = true;
   std::thread([set, patience] {
     int signal = 0;
     sigwait(&set, &signal);
@@ -92,7 +146,9 @@ StopSignal::StopSignal(std::chrono::milliseconds patience) {
     const timespec at_once{};
     while (sigtimedwait(&set, nullptr, &at_once) > 0) {
     }
-    pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
+    sigset_t later = set;
+    sigdelset(&later, SIGHUP);  // a session that closes sends it more than once
+    pthread_sigmask(SIG_UNBLOCK, &later, nullptr);
     for (;;) pause();
   }).detach();
 }
@@ -102,6 +158,11 @@ std::stop_token StopSignal::token() const { return stop_source().get_token(); }
 void remove_at_abrupt_end(const std::filesystem::path& path) {
   const std::lock_guard lock(leftovers().mutex);
   leftovers().paths.push_back(path);
+}
+
+// By a signal, because whoever prints may hold a lock that a stop callback wants.
+void request_stop() {
+  if (has_stop_signal.exchange(false)) kill(getpid(), SIGTERM);
 }
 
 void wait_for(std::stop_token stop) { pause_until(std::chrono::steady_clock::time_point::max(), std::move(stop)); }
@@ -199,12 +260,16 @@ void tell_of_network(const CLI::App& app) {
 }  // namespace
 
 std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv) {
+  guard_standard_streams(app.get_name());
   document_exit_codes(app);
   if (const auto code = answer(app, {argv + 1, argv + argc})) return code;
+  check_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
-    app.exit(help);
+    std::ostringstream text;
+    app.exit(help, text, text);
+    fmt::print("{}", text.str());
     return kExitOk;
   } catch (const CLI::ParseError& error) {
     fmt::print(stderr, "{}\n", explain(app, error));
@@ -215,7 +280,8 @@ std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv) {
 }
 
 void set_up_logging(const std::string& name) {
-  auto logger = spdlog::stderr_color_mt(name);
+  const auto colours = shows_escape_codes(STDERR_FILENO) ? spdlog::color_mode::always : spdlog::color_mode::never;
+  auto logger = spdlog::stderr_color_mt(name, colours);
   logger->set_pattern("%n: %^%l%$: %v");
   spdlog::set_default_logger(std::move(logger));
 }

@@ -12,23 +12,17 @@
 #include <stop_token>
 #include <string>
 
+#include "services/common/process/exit_codes.hpp"
+
 namespace CLI {
 class App;
 }
 
 namespace jostle::common {
 
-/// Exit codes of all programs.
-enum ExitCode : int {
-  kExitOk = 0,
-  kExitFailed = 1,        ///< the work was done and failed
-  kExitUsage = 2,         ///< wrong arguments or a bad file
-  kExitBroken = 3,        ///< parts of the system failed
-  kExitInterrupted = 130  ///< Ctrl-C
-};
-
-/// Turns SIGINT and SIGTERM into a stop request for the whole process. Another one, half a
-/// second later or more, ends it on the spot. Make one in main before any thread starts.
+/// Turns SIGINT, SIGTERM and SIGHUP (a terminal or ssh session that was closed; not under nohup) into a stop request
+/// for the whole process. Another one, half a second later or more, ends it on the spot. Make one in main before any
+/// thread starts.
 ///
 /// A program that has not ended `patience` after the signal, because a thread hangs, says so, removes its temporary
 /// folders and ends with kExitBroken.
@@ -45,6 +39,9 @@ class StopSignal {
 
 /// Has a file or folder removed if the process does not end in an orderly way after a StopSignal.
 void remove_at_abrupt_end(const std::filesystem::path& path);
+
+/// Stops this process as SIGTERM does, once, if it has made a StopSignal; else does nothing. Threads  any.
+void request_stop();
 
 /// Returns once a stop was requested.
 void wait_for(std::stop_token stop);
@@ -73,7 +70,9 @@ void add_domain_options(CLI::App& app, ProcessOptions& options);
 /// that started it. `id`: wire::Participant::id().
 std::string participant_name(std::uint64_t id);
 
-/// Parses the command line. Returns an exit code if the program is to end: after --help, or with kExitUsage after wrong
+/// Parses the command line, after guard_standard_streams(). Numbers are decimal and finite in every program, and only
+/// numbers that may be below zero have a minus; texts are not empty, but for --discovery, --namespace and --secure,
+/// where that means none. Returns an exit code if the program is to end: after --help, or with kExitUsage after wrong
 /// arguments, which it explains. Says in a line what in the environment decides how processes find each other, where a
 /// user may not expect it. Three first words are not for users and in no help:
 ///
@@ -82,7 +81,7 @@ std::string participant_name(std::uint64_t id);
 ///   --man PURPOSE             see manual_page(); for the build
 std::optional<int> parse_arguments(CLI::App& app, int argc, char** argv);
 
-/// Sends log lines to standard error, as "NAME: level: text".
+/// Sends log lines to standard error, as "NAME: level: text"; in colour where a terminal shows it.
 void set_up_logging(const std::string& name);
 
 }  // namespace jostle::common

@@ -5,11 +5,13 @@
 
 #include <cstdio>
 
+#include "services/common/terminal/terminal.hpp"
+
 namespace jostle::common {
 
 LiveLine::LiveLine(std::string speaker, PlainLines plain)
     : speaker_(std::move(speaker)),
-      live_(plain != PlainLines::kAlways && isatty(STDERR_FILENO) == 1),
+      live_(plain != PlainLines::kAlways && shows_escape_codes(STDERR_FILENO)),
       plain_(plain != PlainLines::kNever && !live_) {}
 
 LiveLine::~LiveLine() { finish(); }

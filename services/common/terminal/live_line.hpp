@@ -11,7 +11,7 @@
 namespace jostle::common {
 
 /// When lines are written one below the other instead of being drawn over: never, where standard error is no
-/// terminal, or always.
+/// terminal that understands escape codes, or always.
 enum class PlainLines { kNever, kElsewhere, kAlways };
 
 /// A LiveLine stands on standard error. What is drawn needs a terminal, or plain lines; what is said is always

@@ -32,7 +32,7 @@ int serve(const wire::ParticipantOptions& dds_options, const WorkerOptions& opti
     std::erase_if(known, [&](const std::string& address) { return !before.contains(address); });  // too late, perhaps
     if (!participant_result) {
       spdlog::error("{}", participant_result.error().message);
-      return common::kExitUsage;
+      return common::exit_code_of(participant_result.error());
     }
     WorkerService worker(*participant_result, options);
     const std::string where = options.cores.empty() ? "" : fmt::format(", on cores {}", fmt::join(options.cores, ", "));

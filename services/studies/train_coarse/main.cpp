@@ -31,18 +31,7 @@ struct Arguments {
 
 int fail(const Error& error) {
   fmt::print(stderr, "jostle train-coarse: {}\n", error.message);
-  switch (error.code) {
-    case Code::kCancelled:
-      return common::kExitInterrupted;
-    case Code::kInvalidArgument:
-    case Code::kNotFound:
-      return common::kExitUsage;
-    case Code::kUnavailable:
-    case Code::kInternal:
-      return common::kExitBroken;
-    default:
-      return common::kExitFailed;
-  }
+  return common::exit_code_of(error);
 }
 
 int collect_from(physics_pool::Pool& pool, const Arguments& arguments, std::stop_token stop) {
@@ -56,6 +45,7 @@ int collect_from(physics_pool::Pool& pool, const Arguments& arguments, std::stop
 }
 
 int collect_data(Arguments& arguments, std::stop_token stop) {
+  if (auto ok = common::check_outputs({{"--out", arguments.data, {}}}); !ok) return fail(ok.error());
   if (arguments.pool == "threads") {
     arguments.collect.in_flight = arguments.threads;
     physics_pool::ThreadPool pool(arguments.threads);
@@ -75,6 +65,7 @@ int collect_data(Arguments& arguments, std::stop_token stop) {
 }
 
 int fit_network(Arguments& arguments, std::stop_token stop) {
+  if (auto ok = common::check_outputs({{"--out", arguments.net, {}}}); !ok) return fail(ok.error());
   const auto start = std::chrono::steady_clock::now();
   const auto data_result = read_transitions(arguments.data);
   if (!data_result) return fail(data_result.error());

@@ -93,7 +93,6 @@ Result<TransitionFile> read_transitions(const fs::path& file) {
 
 Result<TransitionWriter> TransitionWriter::open(const fs::path& file, const DataOrigin& origin, int group) {
   std::error_code problem;
-  if (file.has_parent_path()) fs::create_directories(file.parent_path(), problem);
   const auto bytes = fs::exists(file, problem) ? fs::file_size(file, problem) : 0;
   if (problem) return refused(file, problem.message());
   std::uint64_t size = 0;

@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
   auto participant_result = wire::Participant::open(participant_options);
   if (!participant_result) {
     spdlog::error("{}", participant_result.error().message);
-    return common::kExitUsage;
+    return common::exit_code_of(participant_result.error());
   }
   spdlog::info("{}, domain {}", common::participant_name(participant_result->id()), participant_result->domain());
   try {

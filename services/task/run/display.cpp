@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 
 #include <utility>
+#include <vector>
+
+#include "services/common/terminal/fitted_line.hpp"
 
 namespace jostle::task {
 namespace {
 
 constexpr std::chrono::seconds kRateWindow{1};
+constexpr int kWorkerRank = 6;  // of the first worker: all else is more important
 
 }  // namespace
 
@@ -19,20 +23,26 @@ void Display::show(const jostle_msgs::msg::Feedback& feedback) {
   if (line_.live() || is_news) line_.draw(text(feedback));
 }
 
+// What a terminal has no room for goes, the least important first; plain lines have room for all.
 std::string Display::text(const jostle_msgs::msg::Feedback& feedback) {
-  std::string workers;
   double total = 0.0;
+  std::vector<common::LinePart> workers;
   for (const auto& report : feedback.workers()) {
     if (!report.alive()) continue;
     const double rate = rates_[report.id()].per_second;
     total += rate;
-    workers += fmt::format(" {}:{:.1f}", report.name(), rate);
+    workers.push_back({fmt::format("{}:{:.1f}", report.name(), rate), kWorkerRank + static_cast<int>(workers.size())});
   }
-  return fmt::format(
-      "{:5.1f} s  {:<9} iteration {:>2}  cost {:>8.1f}  target {:>5.1f} cm  actions {:>2}  "
-      "re-plans {:>2}  {:.1f} {}/s [{} ]",
-      feedback.elapsed(), feedback.phase(), feedback.iteration(), feedback.cost(), 100 * feedback.target_distance(),
-      feedback.actions(), feedback.replans(), total, feedback.unit(), workers);
+  std::vector<common::LinePart> parts{
+      {fmt::format("{:5.1f} s  {:<9} iteration {:>2}", feedback.elapsed(), feedback.phase(), feedback.iteration()), 0},
+      {fmt::format("cost {:>8.1f}", feedback.cost()), 4},
+      {fmt::format("target {:>5.1f} cm", 100 * feedback.target_distance()), 1},
+      {fmt::format("actions {:>2}", feedback.actions()), 5},
+      {fmt::format("re-plans {:>2}", feedback.replans()), 2},
+      {fmt::format("{:.1f} {}/s", total, feedback.unit()), 3}};
+  parts.insert(parts.end(), workers.begin(), workers.end());
+  const std::size_t width = line_.live() ? line_.width() : std::string::npos;
+  return common::fitted_line(std::move(parts), width);
 }
 
 void Display::measure_rates(const jostle_msgs::msg::Feedback& feedback) {

@@ -71,8 +71,9 @@ Result<jostle_msgs::msg::GoalResult> follow(GoalClient& client, common::LiveLine
 }
 
 int perform(const RunOptions& options, double patience, std::stop_token stop) {
-  auto participant_result = wire::Participant::open({.name = "jostle_goal", .domain = options.domain, .role = wire::Role::kRobot});
-  if (!participant_result) return fail(participant_result.error(), common::kExitUsage);
+  auto participant_result =
+      wire::Participant::open({.name = "jostle_goal", .domain = options.domain, .role = wire::Role::kRobot});
+  if (!participant_result) return fail(participant_result.error(), common::exit_code_of(participant_result.error()));
   common::LiveLine line("jostle goal", options.headless ? common::PlainLines::kAlways : common::PlainLines::kElsewhere);
   Display display(line);
   GoalClient client(*participant_result, fmt::format("goal-{:016x}", participant_result->id()),
@@ -108,7 +109,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.1, 86400.0));
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   const common::StopSignal signal;
-  if (auto ok = complete(arguments, options); !ok) return fail(ok.error(), common::kExitUsage);
+  if (auto ok = complete(arguments, options); !ok) return fail(ok.error(), common::exit_code_of(ok.error()));
   try {
     return perform(options, patience, signal.token());
   } catch (const wire::SetupError& error) {

@@ -26,8 +26,7 @@ int perform(const RunOptions& options, std::stop_token stop) {
   auto session_result = Session::start(options, {.on_feedback = [&](const auto& feedback) { display.show(feedback); },
                                                  .on_notice = [&](const std::string& text) { line.say("{}", text); }});
   if (!session_result) {
-    return fail(session_result.error(),
-                session_result.error().code == Code::kInvalidArgument ? common::kExitUsage : common::kExitBroken);
+    return fail(session_result.error(), common::exit_code_of(session_result.error()));
   }
   auto result = (*session_result)->perform(stop);
   line.finish();
@@ -75,7 +74,7 @@ int main(int argc, char** argv) {
   }
   if (pin) options.cores = common::allowed_cores();
   const common::StopSignal signal;
-  if (auto ok = complete(arguments, options); !ok) return fail(ok.error(), common::kExitUsage);
+  if (auto ok = complete(arguments, options); !ok) return fail(ok.error(), common::exit_code_of(ok.error()));
   try {
     return perform(options, signal.token());
   } catch (const wire::SetupError& error) {

@@ -4,6 +4,7 @@
 
 #include "physics_pool/uncertainty/belief.hpp"
 #include "services/common/process/command_line.hpp"
+#include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
 #include "services/task/config/predictor.hpp"
 
@@ -48,6 +49,12 @@ void add_goal_options(CLI::App& app, GoalArguments& arguments, RunOptions& optio
 }
 
 Result<void> complete(const GoalArguments& arguments, RunOptions& options) {
+  if (auto ok = common::check_outputs({{"--json", options.json, {}},
+                                       {"--picture", options.picture, {".png"}},
+                                       {"--record", options.record, {}, true}});
+      !ok) {
+    return ok;
+  }
   auto level_result = physics_pool::parse_uncertainty(arguments.level);
   if (!level_result) return level_result.error();
   options.level = *level_result;

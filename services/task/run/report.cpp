@@ -75,50 +75,67 @@ json layout(const physics_pool::Scene& scene) {
   return {{"q", q}, {"q_units", q_units}, {"v", v}, {"v_units", v_units}, {"u", u}, {"u_units", u_units}};
 }
 
+// Where the summary goes: not between the bytes of a file that goes to standard output.
+std::FILE* summary_of(const RunOptions& options) {
+  return files::is_standard(options.json) || files::is_standard(options.picture) ? stderr : stdout;
+}
+
+// In a process of its own: off-screen drawing needs libraries that no run does.
+Result<void> draw_in(const std::filesystem::path& folder, const std::filesystem::path& picture,
+                     const std::string& frames) {
+  const auto frames_file = folder / "frames.json", drawn = folder / "picture.png";
+  if (auto ok = common::write_text(frames_file, frames); !ok) return ok;
+  auto child_result =
+      common::ChildProcess::start(common::program_folder() / "jostle_render",
+                                  {frames_file, "-o", drawn, "--columns", "4", "--size", "480x360"}, folder / "log");
+  if (!child_result) return child_result.error();
+  const common::ExitStatus ended = child_result->wait();
+  if (!ended.ok()) {
+    return Error{Code::kIo,
+                 fmt::format("{}: not drawn, {}\n{}", picture.string(), ended.text(), child_result->last_words())};
+  }
+  const auto bytes_result = common::read_text(drawn);
+  if (!bytes_result) return bytes_result.error();
+  return common::write_text(picture, *bytes_result);
+}
+
 Result<void> draw(const RunOptions& options, const json& report) {
   const json& states = report[options.plan_only ? "plan_states" : "observed_states"];
   if (states.empty()) {
-    fmt::print("  picture      not drawn: there is no plan\n");
+    fmt::print(summary_of(options), "  picture      not drawn: there is no plan\n");
     return {};
   }
   const json input{{"scene", physics_pool::to_yaml(options.plan_only ? options.planning : options.scene)},
                    {"frames", frames_of(states, options, report)}};
-  const std::filesystem::path base = options.picture.string() + ".frames";
-  const auto frames_file = base.string() + ".json", log_file = base.string() + ".log";
-  if (auto ok = common::write_text(frames_file, input.dump()); !ok) return ok;
-  // A process of its own: off-screen drawing needs libraries that no run does.
-  auto child_result = common::ChildProcess::start(
-      common::program_folder() / "jostle_render",
-      {frames_file, "-o", options.picture.string(), "--columns", "4", "--size", "480x360"}, log_file);
-  if (!child_result) return child_result.error();
-  const common::ExitStatus ended = child_result->wait();
-  const std::string words = child_result->last_words();
-  std::filesystem::remove(frames_file);
-  std::filesystem::remove(log_file);
-  if (ended.ok()) {
-    fmt::print("  picture      {}\n", options.picture.string());
-    return {};
-  }
-  return Error{Code::kIo, fmt::format("{}: not drawn, {}\n{}", options.picture.string(), ended.text(), words)};
+  const auto folder_result = common::make_temporary_folder("picture");
+  if (!folder_result) return folder_result.error();
+  auto drawn = draw_in(*folder_result, options.picture, input.dump());
+  std::error_code ignored;
+  std::filesystem::remove_all(*folder_result, ignored);
+  if (drawn) fmt::print(summary_of(options), "  picture      {}\n", options.picture.string());
+  return drawn;
 }
 
 void print_summary(const RunOptions& options, const json& report) {
-  fmt::print("\n{}: {}\n", report["success"].get<bool>() ? "SUCCESS" : "FAILURE", report["reason"].get<std::string>());
+  std::FILE* out = summary_of(options);
+  fmt::print(out, "\n{}: {}\n", report["success"].get<bool>() ? "SUCCESS" : "FAILURE",
+             report["reason"].get<std::string>());
   if (report["cost"].is_null()) {
-    fmt::print("  first plan   none was finished within {:.1f} s\n", report["total_seconds"].get<double>());
+    fmt::print(out, "  first plan   none was finished within {:.1f} s\n", report["total_seconds"].get<double>());
   } else {
-    fmt::print("  first plan   {:.1f} s, {} iterations, cost {:.1f}, hash {}\n", report["plan_seconds"].get<double>(),
-               report["iterations"].get<int>(), report["cost"].get<double>(), report["plan_hash"].get<std::string>());
+    fmt::print(out, "  first plan   {:.1f} s, {} iterations, cost {:.1f}, hash {}\n",
+               report["plan_seconds"].get<double>(), report["iterations"].get<int>(), report["cost"].get<double>(),
+               report["plan_hash"].get<std::string>());
   }
-  fmt::print("  execution    {} actions, {} re-plans, {:.1f} s in all\n", report["actions"].get<int>(),
+  fmt::print(out, "  execution    {} actions, {} re-plans, {:.1f} s in all\n", report["actions"].get<int>(),
              report["replans"].get<int>(), report["total_seconds"].get<double>());
-  fmt::print("  physics      {} rollouts on {} {}, controller {}\n", report["rollouts"].get<std::uint64_t>(),
+  fmt::print(out, "  physics      {} rollouts on {} {}, controller {}\n", report["rollouts"].get<std::uint64_t>(),
              report["used_workers"].size(), options.pool == "threads" ? "threads" : "workers", options.controller);
   for (const ParameterDifference& change : options.changed) {
-    fmt::print("  parameter    {} {}, by default {}\n", change.key, to_text(change.after), to_text(change.before));
+    fmt::print(out, "  parameter    {} {}, by default {}\n", change.key, to_text(change.after), to_text(change.before));
   }
   if (!options.record.empty()) {
-    fmt::print("  bag          {}; `jostle replay {}` makes its decisions again\n", options.record.string(),
+    fmt::print(out, "  bag          {}; `jostle replay {}` makes its decisions again\n", options.record.string(),
                options.record.string());
   }
 }
@@ -153,14 +170,12 @@ Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::Goa
   report["changed_parameters"] = changes_of(options);
   report["layout"] = layout(options.scene);
   print_summary(options, report);
-  if (!options.picture.empty()) {
-    if (auto ok = draw(options, report); !ok) return ok;
-  }
+  const auto drawn = options.picture.empty() ? Result<void>() : draw(options, report);
   if (!options.json.empty()) {
     if (auto ok = common::write_results(options.json, report); !ok) return ok;
-    fmt::print("  numbers      {}\n", options.json.string());
+    fmt::print(summary_of(options), "  numbers      {}\n", options.json.string());
   }
-  return {};
+  return drawn;  // not before: numbers are worth more than a picture
 }
 
 }  // namespace jostle::task

@@ -12,6 +12,7 @@
 #include "services/common/process/files.hpp"
 #include "services/common/process/nearest.hpp"
 #include "services/common/process/program.hpp"
+#include "services/common/process/standard_streams.hpp"
 #include "services/tools/launcher/programs.hpp"
 
 namespace jostle::tools {
@@ -47,7 +48,7 @@ int become(const std::filesystem::path& folder, const std::string& name, std::ve
   arguments.push_back(nullptr);
   execv(file.c_str(), arguments.data());
   fmt::print(stderr, "jostle: {} cannot be run: {}\n", file, std::strerror(errno));
-  return common::kExitFailed;
+  return common::kExitBroken;
 }
 
 // What may stand at the place of the last word: programs, or what the program there says.
@@ -107,4 +108,7 @@ int launch(const std::vector<char*>& arguments) {
 }  // namespace
 }  // namespace jostle::tools
 
-int main(int argc, char** argv) { return jostle::tools::launch({argv + 1, argv + argc}); }
+int main(int argc, char** argv) {
+  jostle::common::guard_standard_streams("jostle");
+  return jostle::tools::launch({argv + 1, argv + argc});
+}

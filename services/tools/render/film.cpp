@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "idl/files/files.hpp"
 #include "physics_pool/render/montage.hpp"
 #include "services/common/process/child_process.hpp"
 #include "services/common/process/files.hpp"
@@ -13,6 +14,7 @@ namespace fs = std::filesystem;
 using physics_pool::Picture;
 
 constexpr const char* kPattern = "frame-%05d.png";
+constexpr std::size_t kMostFilm = std::size_t{4} << 30;  // bytes; an hour has about one GiB
 
 // Draws one frame after the other into `use`.
 Result<void> draw_each(const Frames& input, const DrawOptions& options, const std::stop_token& stop,
@@ -49,7 +51,7 @@ Result<void> draw_sheet(const Frames& input, const fs::path& output, const DrawO
 Result<void> draw_sequence(const Frames& input, const fs::path& folder, const DrawOptions& options,
                            const std::stop_token& stop) {
   std::error_code problem;
-  fs::create_directories(folder, problem);
+  fs::create_directory(folder.has_filename() ? folder : folder.parent_path(), problem);
   if (problem) return Error{Code::kIo, fmt::format("{}: {}", folder.string(), problem.message())};
   return draw_each(input, options, stop, [&](std::size_t i, Picture picture) -> Result<void> {
     // A caption below each, even an empty one: all pictures of a film are equally large.
@@ -70,36 +72,53 @@ std::vector<std::string> encoder_arguments(const fs::path& folder, const fs::pat
     words.insert(words.end(), {"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-c:v", "libx264", "-crf", "20",
                                "-pix_fmt", "yuv420p", "-movflags", "+faststart"});
   }
-  words.push_back(fs::absolute(output).string());
+  words.push_back(output.string());
   return words;
 }
 
+// Into a folder of its own first: a film that is cut short is none.
 Result<void> draw_film(const Frames& input, const fs::path& output, const DrawOptions& options,
                        const std::stop_token& stop) {
   auto folder_result = common::make_temporary_folder("film");
   if (!folder_result) return folder_result.error();
-  std::error_code problem;
-  if (output.has_parent_path()) fs::create_directories(output.parent_path(), problem);
+  const fs::path film = *folder_result / ("film" + output.extension().string());
   auto drawn = draw_sequence(input, *folder_result, options, stop);
   if (drawn) {
-    drawn = common::run_tool("ffmpeg", "ffmpeg", encoder_arguments(*folder_result, output, options.per_second),
+    drawn = common::run_tool("ffmpeg", "ffmpeg", encoder_arguments(*folder_result, film, options.per_second),
                              *folder_result / "log");
   }
-  fs::remove_all(*folder_result, problem);
+  if (drawn) {
+    const auto bytes_result = files::read(film, kMostFilm);
+    drawn = bytes_result ? files::write(output, *bytes_result) : Result<void>(bytes_result.error());
+  }
+  std::error_code ignored;
+  fs::remove_all(*folder_result, ignored);
   return drawn;
 }
 
+bool is_film(const fs::path& output) { return output.extension() == ".mp4" || output.extension() == ".gif"; }
+
 }  // namespace
 
-bool is_sheet(const fs::path& output) { return output.extension() == ".png"; }
+bool is_sheet(const fs::path& output) { return output.extension() == ".png" || files::is_standard(output); }
+
+Result<void> check_target(const fs::path& output, bool has_one_frame) {
+  const bool is_folder = output.extension().empty() && !files::is_standard(output);
+  const files::Output target{
+      .option = "--output", .path = output, .endings = {".png", ".mp4", ".gif"}, .is_folder = is_folder};
+  if (has_one_frame && is_film(output)) {
+    return invalid(target.option, fmt::format("'{}' for a single picture", output.string()),
+                   ".png; films are drawn of a bag, or of several frames");
+  }
+  auto ok = files::check_output(target);
+  if (ok || !is_folder) return ok;
+  return Error{ok.error().code, ok.error().message + "; or a file that ends in .png, .mp4 or .gif"};
+}
 
 Result<void> draw(const Frames& frames, const fs::path& output, const DrawOptions& options, std::stop_token stop) {
-  const fs::path ending = output.extension();
   if (is_sheet(output)) return draw_sheet(frames, output, options, stop);
-  if (ending == ".mp4" || ending == ".gif") return draw_film(frames, output, options, stop);
-  if (ending.empty()) return draw_sequence(frames, output, options, stop);
-  return Error{Code::kInvalidArgument,
-               fmt::format("--output: got '{}', wanted .png, .mp4, .gif, or a folder", output.string())};
+  if (is_film(output)) return draw_film(frames, output, options, stop);
+  return draw_sequence(frames, output, options, stop);
 }
 
 }  // namespace jostle::tools

@@ -21,16 +21,21 @@ struct DrawOptions {
 
 /// Draws frames by the ending of `output`:
 ///
-///   .png         one sheet, side by side with captions
+///   .png or -    one sheet, side by side with captions
 ///   .mp4, .gif   a film (H.264; at most 256 colours), made by ffmpeg
 ///   none         a folder of frame-00001.png, …, which it makes
 ///
-/// Errors   kInvalidArgument  another ending; a state that does not fit
-///          kNotFound         ffmpeg is not installed
+/// Errors   kInvalidArgument  a state that does not fit
+///          kUnavailable      ffmpeg is not installed
 ///          kIo               what cannot be written; ffmpeg's own words
 ///          kCancelled        a stop was requested; nothing is left behind
 Result<void> draw(const Frames& frames, const std::filesystem::path& output, const DrawOptions& options,
                   std::stop_token stop);
+
+/// Checks before any work that draw() can write there; `has_one_frame`: of which no film can be made.
+/// Errors   kInvalidArgument  another ending; a film of one frame; a folder in which there is something
+///          kIo               no such file, or folder, can be made
+Result<void> check_target(const std::filesystem::path& output, bool has_one_frame);
 
 /// Whether draw() makes a sheet for that name.
 bool is_sheet(const std::filesystem::path& output);

@@ -54,7 +54,7 @@ class Reader {
     for (const json& value : q) {
       if (!value.is_number()) {
         return wrong(fmt::format("{}.q[{}]", field, frame.state.q.size()),
-                     fmt::format("got {}, wanted a number", value.dump()));
+                     fmt::format("got {}, wanted a number", value.type_name()));
       }
       frame.state.q.push_back(value.get<double>());
     }

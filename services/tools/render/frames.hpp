@@ -25,7 +25,7 @@ struct Frames {
 
 /// Reads {"scene": "<YAML>", "frames": [{"caption": "…", "q": […]}, …]}; a
 /// caption may be missing.
-/// Errors   kIo, kInvalidArgument; the message names file, field, got and wanted.
+/// Errors   kNotFound, kInvalidArgument; the message names file, field, got and wanted.
 Result<Frames> load_frames(const std::filesystem::path& file);
 
 /// Loads a scene and takes its start as the only frame, without a caption.

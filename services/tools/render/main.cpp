@@ -32,10 +32,13 @@ bool parse_size(const std::string& text, physics_pool::RenderOptions& options) {
          static_cast<std::size_t>(end) == text.size();
 }
 
+bool is_scene(const std::filesystem::path& input) {
+  return input.extension() == ".yaml" || input.extension() == ".yml";
+}
+
 Result<Frames> load(const Arguments& arguments) {
   if (arguments.input.extension() == ".json") return load_frames(arguments.input);
-  if (arguments.input.extension() == ".yaml" || arguments.input.extension() == ".yml")
-    return load_start(arguments.input);
+  if (is_scene(arguments.input)) return load_start(arguments.input);
   BagFramesOptions options = arguments.bag;
   options.clock = arguments.clock == "wall" ? bags::RunClock::kWall : bags::RunClock::kWorld;
   options.per_second = arguments.draw.per_second / arguments.speed;
@@ -44,8 +47,10 @@ Result<Frames> load(const Arguments& arguments) {
 }
 
 Result<void> run(const Arguments& arguments, std::stop_token stop) {
+  if (auto ok = check_target(arguments.output, is_scene(arguments.input)); !ok) return ok;
   auto frames_result = load(arguments);
   if (!frames_result) return frames_result.error();
+  if (auto ok = check_target(arguments.output, frames_result->frames.size() == 1); !ok) return ok;
   common::ProgressLine line({.doing = "drawing", .unit = "frames"});
   DrawOptions options = arguments.draw;
   options.on_progress = [&line](std::size_t drawn, std::size_t all) { line.show(drawn, all); };
@@ -67,7 +72,9 @@ int main(int argc, char** argv) {
          "input", arguments.input,
          "BAG with a recorded run; STATES.json with a scene and frames of {caption, q}; or SCENE.yaml for its start")
       ->required();
-  app.add_option("-o,--output", arguments.output, "NAME.png, NAME.mp4, NAME.gif, or a folder for frame-00001.png, ...")
+  app.add_option(
+         "-o,--output", arguments.output,
+         "NAME.png, NAME.mp4, NAME.gif, or a new folder for frame-00001.png, ...; - is a PNG on standard output")
       ->required();
   app.add_option("--columns", arguments.draw.columns, "of a PNG: pictures in a row")
       ->check(CLI::Range(1, 100))
@@ -88,6 +95,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"world", "wall"}))
       ->capture_default_str();
   app.add_option("--goal", arguments.bag.goal, "goal id of the run to draw, where a bag has several");
+  app.footer(common::exit_codes_help());
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   if (!parse_size(arguments.size, arguments.draw.picture)) {
     fmt::print(stderr, "jostle render: --size: got '{}', wanted WxH such as 640x480\n", arguments.size);
@@ -96,7 +104,7 @@ int main(int argc, char** argv) {
   const common::StopSignal signal;
   if (auto ok = run(arguments, signal.token()); !ok) {
     fmt::print(stderr, "jostle render: {}\n", ok.error().message);
-    return ok.error().code == jostle::Code::kCancelled ? common::kExitInterrupted : common::kExitFailed;
+    return common::exit_code_of(ok.error());
   }
   return common::kExitOk;
 }

@@ -4,10 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "physics_pool/robot/kinematics.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
@@ -24,28 +27,35 @@ namespace {
 using physics_pool::Scene;
 using physics_pool::SceneObject;
 
-const std::string kStandardOutput = "-";
-
 struct Arguments {
   int chapter = 3;
+  CLI::App* generates = nullptr;  // to see which options were given
   physics_pool::GenerateOptions generate;
   physics_pool::GeneratePushOptions push;
   std::optional<int> objects;  // 15 of Chapter 3, 3 of Chapter 7
   std::string shape = "cylinder";
-  std::string input, output = kStandardOutput;
+  std::string input, output = "-";
+  std::vector<std::string> inputs;
+  bool as_json = false;
   std::string uncertainty = "low";
   std::uint64_t seed = 1;
 };
 
-Result<void> write(const std::string& file, const std::string& text) {
-  if (file == kStandardOutput) {
-    if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0) return {};
-    return Error{Code::kIo, "standard output: cannot be written"};
+// Options that mean nothing for the scenes of a chapter are refused, not ignored.
+Result<void> check_chapter(const Arguments& arguments) {
+  const bool grasps = arguments.chapter == 3;
+  const std::vector<std::string> others =
+      grasps ? std::vector<std::string>{"--shape", "--integrator"} : std::vector<std::string>{"--table"};
+  for (const std::string& option : others) {
+    if (arguments.generates->count(option) == 0) continue;
+    return invalid(option, fmt::format("it for scenes of Chapter {}", arguments.chapter),
+                   grasps ? "--chapter 6 or 7 with it" : "--chapter 3 with it");
   }
-  return common::write_text(file, text);
+  return {};
 }
 
 Result<Scene> make_scene(Arguments arguments) {
+  if (auto ok = check_chapter(arguments); !ok) return ok.error();
   if (arguments.chapter == 3) {
     arguments.generate.objects = arguments.objects.value_or(arguments.generate.objects);
     return physics_pool::generate_chapter3(arguments.generate);
@@ -61,7 +71,7 @@ Result<Scene> make_scene(Arguments arguments) {
   return physics_pool::generate_chapter7(arguments.push);
 }
 
-// The commands give the text that is to be written: all that goes wrong in them is bad input.
+// The commands give the text that is to be written.
 
 Result<std::string> generate(const Arguments& arguments) {
   auto scene_result = make_scene(arguments);
@@ -69,10 +79,36 @@ Result<std::string> generate(const Arguments& arguments) {
   return to_yaml(*scene_result, physics_pool::RobotText::kByName);
 }
 
+// Widths at the target's narrowest, seen from above, against the hand at its widest.
+void warn_of_target(const std::string& file, const Scene& scene) {
+  const auto& hand = scene.robot.model.hand;
+  if (scene.task.kind != "grasp" || !hand) return;
+  const SceneObject& target = scene.objects[static_cast<std::size_t>(scene.target())];
+  const double width =
+      target.shape == physics_pool::Shape::kBox ? std::min(target.size[0], target.size[1]) : 2 * target.radius;
+  if (width < hand->stroke) return;
+  fmt::print(stderr,
+             "jostle scene: warning: {}: the target '{}' is {:.1f} mm wide, the hand opens to {:.1f} mm: it cannot be "
+             "grasped\n",
+             file, target.name, 1e3 * width, 1e3 * hand->stroke);
+}
+
+// All files are looked at, whatever is wrong with the first.
 Result<std::string> check(const Arguments& arguments) {
-  const auto scene_result = physics_pool::load_scene(arguments.input);
-  if (!scene_result) return scene_result.error();
-  return fmt::format("ok {}\n", to_string(scene_hash(*scene_result)));
+  std::string text, problems;
+  for (const std::string& file : arguments.inputs) {
+    const auto scene_result = physics_pool::load_scene(file);
+    if (!scene_result) {
+      problems += (problems.empty() ? "" : "\n") + scene_result.error().message;
+      continue;
+    }
+    warn_of_target(file, *scene_result);
+    text += arguments.inputs.size() == 1 ? "" : file + ": ";
+    text += fmt::format("ok {}\n", to_string(scene_hash(*scene_result)));
+  }
+  if (problems.empty()) return text;
+  fmt::print("{}", text);  // those that are fine
+  return Error{Code::kInvalidArgument, problems};
 }
 
 Result<std::string> perturb(const Arguments& arguments) {
@@ -94,10 +130,56 @@ std::string size_text(const Body& body) {
   return fmt::format("r {:.1f}, h {:.1f}", 1e3 * body.radius, 1e3 * body.height);
 }
 
+template <class Body>
+nlohmann::json size_json(const Body& body) {
+  if (body.shape == physics_pool::Shape::kBox) return {{"shape", "box"}, {"size", body.size}};
+  return {{"shape", "cylinder"}, {"radius", body.radius}, {"height", body.height}};
+}
+
+nlohmann::json to_json(const Scene& scene) {
+  nlohmann::json json{{"name", scene.name},
+                      {"hash", to_string(scene_hash(scene))},
+                      {"surface", nlohmann::json::array()},
+                      {"fixtures", nlohmann::json::array()},
+                      {"objects", nlohmann::json::array()},
+                      {"time_step", scene.physics.time_step},
+                      {"integrator", scene.physics.integrator}};
+  for (const auto& part : scene.surface.parts)
+    json["surface"].push_back({{"x", part.x}, {"y", part.y}, {"size", part.size}});
+  for (const auto& fixture : scene.fixtures) {
+    json["fixtures"].push_back(size_json(fixture));
+    json["fixtures"].back().update(
+        {{"name", fixture.name}, {"position", fixture.pose.position}, {"orientation", fixture.pose.orientation}});
+  }
+  for (const SceneObject& object : scene.objects) {
+    json["objects"].push_back(size_json(object));
+    json["objects"].back().update({{"name", object.name},
+                                   {"mass", object.mass},
+                                   {"friction", object.friction},
+                                   {"x", object.x},
+                                   {"y", object.y},
+                                   {"yaw", object.yaw}});
+  }
+  auto& robot = json["robot"];
+  robot = {
+      {"model", scene.robot.model.name}, {"start", nlohmann::json::object()}, {"controls", nlohmann::json::array()}};
+  for (std::size_t i = 0; i < scene.robot.q.size(); ++i)
+    robot["start"][scene.robot.model.joints[i].name] = scene.robot.q[i];
+  for (const physics_pool::Axis& axis : scene.robot.model.axes) robot["controls"].push_back(axis.name);
+  json["task"] = {{"kind", scene.task.kind}, {"target", scene.task.target}};
+  const auto disc = [](const physics_pool::Disc& d) {
+    return nlohmann::json{{"x", d.x}, {"y", d.y}, {"radius", d.radius}};
+  };
+  if (physics_pool::find_task_kind(scene.task.kind)->has_goal) json["task"]["goal"] = disc(scene.task.goal);
+  if (scene.task.obstacle) json["task"]["obstacle"] = disc(*scene.task.obstacle);
+  return json;
+}
+
 Result<std::string> show(const Arguments& arguments) {
   const auto scene_result = physics_pool::load_scene(arguments.input);
   if (!scene_result) return scene_result.error();
   const Scene& scene = *scene_result;
+  if (arguments.as_json) return to_json(scene).dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   std::string text;
   const auto print = [&text]<class... T>(fmt::format_string<T...> format, T&&... values) {
     fmt::format_to(std::back_inserter(text), format, std::forward<T>(values)...);
@@ -135,11 +217,11 @@ Result<std::string> show(const Arguments& arguments) {
 using Command = Result<std::string> (*)(const Arguments&);
 
 void add_input(CLI::App& command, Arguments& arguments) {
-  command.add_option("file", arguments.input, "a scene file")->required();
+  command.add_option("file", arguments.input, "a scene file; - is standard input")->required();
 }
 
 void add_output(CLI::App& command, Arguments& arguments) {
-  command.add_option("-o,--output", arguments.output, "file to write; - is the standard output")->capture_default_str();
+  command.add_option("-o,--output", arguments.output, "file to write; - is standard output")->capture_default_str();
 }
 
 // Adds the four commands; whichever is given ends up in `chosen`.
@@ -150,6 +232,7 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
     return added;
   };
   CLI::App* generates = command("generate", "make a random scene of the thesis", generate);
+  arguments.generates = generates;
   generates
       ->add_option("--chapter", arguments.chapter,
                    "whose scenes: 3, Sec. 3.3.1, grasping; 6, Sec. 6.3.3, pushing round an obstacle; 7, "
@@ -174,7 +257,9 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
       ->capture_default_str();
   add_output(*generates, arguments);
 
-  add_input(*command("check", "say ok and the scene's hash, or what is wrong", check), arguments);
+  command("check", "say ok and the scene's hash, or everything that is wrong", check)
+      ->add_option("files", arguments.inputs, "scene files; - is standard input")
+      ->required();
 
   CLI::App* perturbs = command("perturb", "make a planner's uncertain belief of a scene", perturb);
   add_input(*perturbs, arguments);
@@ -184,7 +269,9 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   perturbs->add_option("--seed", arguments.seed, "equal seeds give equal beliefs")->capture_default_str();
   add_output(*perturbs, arguments);
 
-  add_input(*command("show", "list the objects of a scene", show), arguments);
+  CLI::App* shows = command("show", "list the objects of a scene", show);
+  add_input(*shows, arguments);
+  shows->add_flag("--json", arguments.as_json, "as an object, in metres, kilograms and radians");
 }
 
 }  // namespace
@@ -197,16 +284,17 @@ int main(int argc, char** argv) {
   Command chosen = nullptr;
   CLI::App app{"Makes, checks, disturbs and shows scene files.", "jostle scene"};
   app.require_subcommand(1);
+  app.footer(common::exit_codes_help());
   add_commands(app, arguments, chosen);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
+  const auto fail = [](const Error& error) {
+    fmt::print(stderr, "jostle scene: {}\n", error.message);
+    return common::exit_code_of(error);
+  };
+  if (auto ok = common::check_outputs({{.option = "--output", .path = arguments.output, .endings = {}}}); !ok)
+    return fail(ok.error());
   const auto text_result = chosen(arguments);
-  if (!text_result) {
-    fmt::print(stderr, "jostle scene: {}\n", text_result.error().message);
-    return common::kExitUsage;
-  }
-  if (auto ok = write(arguments.output, *text_result); !ok) {
-    fmt::print(stderr, "jostle scene: {}\n", ok.error().message);
-    return common::kExitFailed;
-  }
+  if (!text_result) return fail(text_result.error());
+  if (auto ok = common::write_text(arguments.output, *text_result); !ok) return fail(ok.error());
   return common::kExitOk;
 }

@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "idl/files/files.hpp"
 #include "idl/types/qos.hpp"
 #include "services/common/process/files.hpp"
 
@@ -78,6 +79,8 @@ std::string name_of(const XMLElement& profile) {
 }
 
 constexpr const char* kNumber = "a whole number";
+constexpr std::size_t kMostBytes = std::size_t{256} << 10;  // thirty times what comes along
+constexpr int kMostAttempts = 500;                          // at finding what a file is refused for
 
 std::string got_in(const XMLElement& place) {
   return place.NoChildren() ? "nothing" : fmt::format("'{}'", text_of(place));
@@ -104,12 +107,13 @@ std::string complaint_about(XMLDocument& document, Complaints& complaints) {
 // the complaint stays; without it there is another one, or none. What follows it is lost.
 XMLElement& at_fault(XMLDocument& document, const std::string& complaint, Complaints& complaints) {
   XMLElement* place = document.RootElement();
+  int attempts = 0;
   for (;;) {
     XMLElement* removed = nullptr;
     XMLElement* aside = document.NewElement("aside");  // the document's, yet not in it
     do {
       removed = place->LastChildElement();
-      if (!removed) return *place;
+      if (!removed || ++attempts > kMostAttempts) return *place;
       aside->InsertEndChild(removed);
     } while (complaint_about(document, complaints) == complaint);
     place->InsertEndChild(removed);
@@ -141,18 +145,29 @@ Error refusal(const std::filesystem::path& file, XMLDocument& document, const st
   return wrong(file, place, got_in(place), wanted);
 }
 
-// Numbers of which it reads as much as it can: 4 of "4 MiB".
+// Numbers of which it reads as much as it can, 4 of "4 MiB", or in other notations, 16 of "0x10".
 Result<void> check_numbers(const std::filesystem::path& file, const XMLElement& place) {
-  static const std::set<std::string> kNumbers{"depth",
-                                              "max_samples",
+  static const std::set<std::string> kNumbers{"allocated_samples",
+                                              "depth",
+                                              "domainId",
                                               "max_instances",
+                                              "max_samples",
                                               "max_samples_per_instance",
-                                              "allocated_samples",
-                                              "sendBufferSize",
-                                              "receiveBufferSize",
                                               "maxInitialPeersRange",
-                                              "segment_size"};
-  if (kNumbers.contains(place.Name()) && text_of(place).find_first_not_of("0123456789") != std::string::npos) {
+                                              "maxMessageSize",
+                                              "mutation_tries",
+                                              "nanosec",
+                                              "participantID",
+                                              "port",
+                                              "port_queue_capacity",
+                                              "receiveBufferSize",
+                                              "sec",
+                                              "segment_size",
+                                              "sendBufferSize",
+                                              "TTL"};
+  const std::string text = text_of(place);
+  const bool is_word = text.starts_with("DURATION_");  // DURATION_INFINITY and its like
+  if (kNumbers.contains(place.Name()) && !is_word && text.find_first_not_of("0123456789") != std::string::npos) {
     return wrong(file, place, got_in(place), kNumber);
   }
   for (const XMLElement* child = place.FirstChildElement(); child; child = child->NextSiblingElement()) {
@@ -262,13 +277,10 @@ ProfilesFile profiles_file() {
 Result<void> load_profiles(const ProfilesFile& file) {
   XMLProfileManager::DeleteInstance();
   if (file.path.empty()) return {};
+  const auto text_result = files::read(file.path, kMostBytes);
+  if (!text_result) return Error{text_result.error().code, text_result.error().message + "; wanted a file of profiles"};
   XMLDocument document;
-  if (const auto problem = document.LoadFile(file.path.c_str()); problem != tinyxml2::XML_SUCCESS) {
-    using namespace tinyxml2;
-    if (problem == XML_ERROR_FILE_NOT_FOUND || problem == XML_ERROR_FILE_COULD_NOT_BE_OPENED ||
-        problem == XML_ERROR_FILE_READ_ERROR) {
-      return Error{Code::kIo, fmt::format("{}: cannot be read; wanted a file of profiles", file.path.string())};
-    }
+  if (document.Parse(text_result->data(), text_result->size()) != tinyxml2::XML_SUCCESS) {
     return Error{Code::kInvalidArgument, fmt::format("{}:{}: got {}, wanted well-formed XML", file.path.string(),
                                                      document.ErrorLineNum(), document.ErrorName())};
   }

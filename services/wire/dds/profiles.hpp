@@ -24,7 +24,7 @@ ProfilesFile profiles_file();
 ///   data_writer, data_reader   a kind of topic (qos.hpp), or one topic's name on the wire
 ///
 /// Threads  one at a time, and no participant is being made meanwhile.
-/// Errors   kIo               the file cannot be read
+/// Errors   kNotFound         the file is missing, or cannot be read
 ///          kInvalidArgument  says the line, what is there and what was wanted: what Fast DDS does not take,
 ///                            names that nothing asks for, promises that writers and readers cannot keep
 Result<void> load_profiles(const ProfilesFile& file);

@@ -158,20 +158,17 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
 int main(int argc, char** argv) {
   using namespace jostle;
   using namespace jostle::wire;
-  using jostle::Code;
   Arguments arguments;
   Command chosen = nullptr;
   CLI::App app{"Makes, hands out, revokes and checks identities, with which programs protect their DDS domain.",
                "jostle keys"};
-  app.footer(kExample);
+  app.footer(std::string(kExample) + "\n" + common::exit_codes_help());
   app.require_subcommand(1);
   add_commands(app, arguments, chosen);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   if (auto ok = chosen(arguments); !ok) {
     fmt::print(stderr, "jostle keys: {}\n", ok.error().message);
-    // A wrong name or folder, against a disk that refuses. A folder that cannot be read is a wrong one to check.
-    const bool is_ours = ok.error().code == Code::kInvalidArgument || ok.error().code == Code::kNotFound;
-    return is_ours || chosen == check ? common::kExitUsage : common::kExitFailed;
+    return common::exit_code_of(ok.error());
   }
-  return 0;
+  return common::kExitOk;
 }

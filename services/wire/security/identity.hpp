@@ -39,8 +39,7 @@ struct Identity {
 ///
 /// Time     the wall clock, like Fast DDS. It reads dates of permissions in the local time of
 ///          the machine: away from UTC they end up to 14 hours before or after the certificate.
-/// Errors   kNotFound         the folder or a file of it is missing
-///          kIo               a file cannot be read
+/// Errors   kNotFound         the folder or a file of it is missing, or cannot be read
 ///          kInvalidArgument  a file is none, or does not fit the others, or its time is over
 ///          kInternal         libcrypto failed
 ///          Messages say the file, what was got, what was wanted, and the remedy.

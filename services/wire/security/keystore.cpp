@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "idl/files/files.hpp"
 #include "services/wire/security/documents.hpp"
 #include "services/wire/security/pki.hpp"
 
@@ -54,15 +55,6 @@ Result<void> write_new(const fs::path& file, const std::string& text, mode_t mod
   if (::close(descriptor) == 0 && is_kept) return {};
   if (!is_kept) errno = reason;
   return io_error(file, "cannot be written");
-}
-
-// In one step, so that a reader never sees half of it.
-Result<void> replace(const fs::path& file, const std::string& text) {
-  const fs::path draft = file.string() + ".new";
-  ::unlink(draft.c_str());  // of somebody who was interrupted
-  if (auto ok = write_new(draft, text, kPublic); !ok) return ok;
-  if (::rename(draft.c_str(), file.c_str()) == 0) return {};
-  return io_error(file, "cannot be replaced");
 }
 
 Result<void> make_folder(const fs::path& folder, mode_t mode) {
@@ -112,9 +104,21 @@ std::string to_json(const std::vector<Record>& records) {
   return nlohmann::json{{"identities", list}}.dump(2) + "\n";
 }
 
+// A moment of the index, seconds since 1970: whole, and not beyond what clocks of nanoseconds reach (the year 2255).
+std::time_t moment_of(const nlohmann::json& entry, const char* key) {
+  constexpr std::time_t kLatest = 9'000'000'000;
+  const nlohmann::json& value = entry.at(key);
+  // Its text only if it is short: what lies deep in itself cannot be written by recursion.
+  if (!value.is_number_integer() || value.get<std::time_t>() < 0 || value.get<std::time_t>() > kLatest) {
+    const std::string got = value.is_number() ? value.dump() : value.type_name();
+    throw std::runtime_error(fmt::format("{}: got {}, wanted seconds, 0 to {}", key, got, kLatest));
+  }
+  return value.get<std::time_t>();
+}
+
 Result<std::vector<Record>> read_index(const fs::path& folder) {
   const fs::path file = folder / "ca" / "index.json";
-  const auto text_result = read_file(file);
+  const auto text_result = files::read(file, files::kMostText);
   if (!text_result) return text_result.error();
   try {
     const nlohmann::json index = nlohmann::json::parse(*text_result);
@@ -125,8 +129,8 @@ Result<std::vector<Record>> read_index(const fs::path& folder) {
       records.push_back({.name = entry.at("name"),
                          .role = *role,
                          .serial = entry.at("serial"),
-                         .not_after = entry.at("not_after"),
-                         .revoked = entry.at("revoked")});
+                         .not_after = moment_of(entry, "not_after"),
+                         .revoked = moment_of(entry, "revoked")});
     }
     return records;
   } catch (const std::exception& error) {
@@ -207,7 +211,7 @@ Result<void> write_identity(const fs::path& draft, const fs::path& folder, const
   const std::string permissions = permissions_text({.subject = name_of(X509_get_subject_name(certificate.get())),
                                                     .validity = period,
                                                     .rights = rights_of(record.role)});
-  const auto governance_result = read_file(folder / "ca" / "governance.p7s");
+  const auto governance_result = files::read(folder / "ca" / "governance.p7s", files::kMostText);
   if (!governance_result) return governance_result.error();
   if (auto ok = make_folder(draft, 0700); !ok) return ok;
   const auto write = [&](const char* file, const std::string& text, mode_t mode) {
@@ -261,7 +265,9 @@ Result<void> create(const fs::path& folder) {
                              "name, or remove it, which makes every identity it issued a stranger's",
                              folder.string())};
   }
-  fs::create_directories(folder, problem);
+  if (auto ok = files::check_output({.option = "keystore", .path = folder, .endings = {}, .is_folder = true}); !ok)
+    return ok;
+  fs::create_directory(folder, problem);
   if (problem) return Error{Code::kIo, fmt::format("{}: cannot be made: {}", folder.string(), problem.message())};
   fs::permissions(folder, fs::perms::owner_all, problem);
   return guarded<void>(folder, [&] { return create_authority(folder); });
@@ -282,7 +288,7 @@ Result<fs::path> issue(const fs::path& folder, const std::string& name, Role rol
     records.push_back(
         {.name = name, .role = role, .serial = make_serial(), .not_after = now_seconds() + validity.count() * kDay});
     // First of all the index: whatever is issued can be revoked.
-    if (auto ok = replace(folder / "ca" / "index.json", to_json(records)); !ok) return ok.error();
+    if (auto ok = files::write(folder / "ca" / "index.json", to_json(records)); !ok) return ok.error();
     const fs::path identity = folder / "identities" / name;
     const fs::path draft = folder / "identities" / ("." + name + ".new");
     std::error_code problem;
@@ -296,7 +302,8 @@ Result<fs::path> issue(const fs::path& folder, const std::string& name, Role rol
     }
     fs::remove_all(draft, problem);
     records.pop_back();
-    (void)replace(folder / "ca" / "index.json", to_json(records));  // if not, the name is taken until it is revoked
+    (void)files::write(folder / "ca" / "index.json",
+                       to_json(records));  // if not, the name is taken until it is revoked
     return written.error();
   });
 }
@@ -324,7 +331,7 @@ Result<std::vector<fs::path>> revoke(const fs::path& folder, const std::string& 
     }
     const auto authority_result = load_authority(folder);
     if (!authority_result) return authority_result.error();
-    if (auto ok = replace(folder / "ca" / "index.json", to_json(*records_result)); !ok) return ok.error();
+    if (auto ok = files::write(folder / "ca" / "index.json", to_json(*records_result)); !ok) return ok.error();
     const std::string pem = revocation_pem(*authority_result, *records_result);
     std::vector<fs::path> files{folder / "ca" / "crl.pem"};
     std::error_code problem;
@@ -333,7 +340,7 @@ Result<std::vector<fs::path>> revoke(const fs::path& folder, const std::string& 
     }
     std::ranges::sort(files);
     for (const fs::path& file : files) {
-      if (auto ok = replace(file, pem); !ok) return ok.error();
+      if (auto ok = files::write(file, pem); !ok) return ok.error();
     }
     return files;
   });

@@ -26,7 +26,7 @@
 /// Threads  any; calls on one keystore take turns, between processes, too.
 /// Errors   kInvalidArgument  a name or a number of days; says got and wanted
 ///          kNotFound         no keystore there, or no such identity
-///          kIo               a file refused; names it
+///          kIo               a file cannot be written; names it
 ///          kInternal         libcrypto failed
 namespace jostle::wire::keystore {
 

@@ -10,10 +10,7 @@
 #include <openssl/x509_vfy.h>
 #include <openssl/x509v3.h>
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <sstream>
+#include "idl/files/files.hpp"
 
 namespace jostle::wire {
 namespace {
@@ -103,7 +100,7 @@ void sign(X509& certificate, EVP_PKEY& key) { require(X509_sign(&certificate, &k
 // What a PEM file may hold, and how libcrypto reads it.
 template <class Handle, class Read>
 Result<Handle> load_pem(const std::filesystem::path& file, const char* wanted, Read read) {
-  const auto text_result = read_file(file);
+  const auto text_result = files::read(file, files::kMostText);
   if (!text_result) return text_result.error();
   Handle object(read(reading(*text_result).get()));
   if (object) return object;
@@ -218,21 +215,6 @@ std::string to_pem(X509_CRL& list) {
   return text_of(*out);
 }
 
-Result<std::string> read_file(const std::filesystem::path& file) {
-  errno = 0;
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  if (in && text << in.rdbuf()) return text.str();
-  const int reason = errno;
-  std::error_code ignored;
-  if (in && std::filesystem::is_regular_file(file, ignored)) return std::string();  // empty
-  if (reason == ENOENT || reason == ENOTDIR) {
-    return Error{Code::kNotFound, fmt::format("{}: missing", file.string())};
-  }
-  return Error{Code::kIo,
-               fmt::format("{}: cannot be read: {}", file.string(), reason ? std::strerror(reason) : "no file")};
-}
-
 Result<Certificate> load_certificate(const std::filesystem::path& file) {
   return load_pem<Certificate>(file, "certificate",
                                [](BIO* in) { return PEM_read_bio_X509(in, nullptr, no_password, nullptr); });
@@ -249,7 +231,7 @@ Result<RevocationList> load_revocation_list(const std::filesystem::path& file) {
 }
 
 Result<std::string> load_signed_text(const std::filesystem::path& file, X509& authority) {
-  const auto file_result = read_file(file);
+  const auto file_result = files::read(file, files::kMostText);
   if (!file_result) return file_result.error();
   const Bio in = reading(*file_result);
   BIO* clear = nullptr;

@@ -77,8 +77,6 @@ std::string to_pem(X509_CRL& list);
 
 // Reading. Errors name the file, what was got, what was wanted.
 
-/// Reads a whole file. Errors kNotFound: it is missing; kIo: it is there, yet cannot be read.
-Result<std::string> read_file(const std::filesystem::path& file);
 Result<Certificate> load_certificate(const std::filesystem::path& file);
 Result<Key> load_key(const std::filesystem::path& file);
 Result<RevocationList> load_revocation_list(const std::filesystem::path& file);

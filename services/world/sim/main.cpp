@@ -43,41 +43,41 @@ int main(int argc, char** argv) {
   const common::StopSignal signal;
   common::set_up_logging("sim");
 
-  const auto fail = [](const Error& error, int code) {
+  const auto fail = [](const Error& error) {
     spdlog::error("{}", error.message);
-    return code;
+    return common::exit_code_of(error);
   };
   auto level_result = physics_pool::parse_uncertainty(level);
-  if (!level_result) return fail(level_result.error(), common::kExitUsage);
+  if (!level_result) return fail(level_result.error());
   auto scene_result = physics_pool::load_scene(scene_file);
-  if (!scene_result) return fail(scene_result.error(), common::kExitUsage);
+  if (!scene_result) return fail(scene_result.error());
   options.noise = {.sigma = physics_pool::velocity_noise(*level_result), .seed = seed};
   if (belief_file.empty()) {
     options.belief = physics_pool::perturb(*scene_result, *level_result, seed);
   } else {
     auto belief_result = physics_pool::load_scene(belief_file);
-    if (!belief_result) return fail(belief_result.error(), common::kExitUsage);
+    if (!belief_result) return fail(belief_result.error());
     options.belief = std::move(belief_result).value();
     if (auto ok = physics_pool::check_belief(*scene_result, options.belief); !ok) {
-      return fail({ok.error().code, fmt::format("--belief: {}", ok.error().message)}, common::kExitUsage);
+      return fail({ok.error().code, fmt::format("--belief: {}", ok.error().message)});
     }
   }
   auto world_result = physics_pool::World::compile(*scene_result);
-  if (!world_result) return fail(world_result.error(), common::kExitUsage);
+  if (!world_result) return fail(world_result.error());
   auto participant_result = wire::Participant::open(participant_options);
-  if (!participant_result) return fail(participant_result.error(), common::kExitUsage);
+  if (!participant_result) return fail(participant_result.error());
   // Before it says a word.
   const auto claim_result = common::DomainClaim::take("simulated world", participant_result->domain(),
                                                       std::chrono::seconds(1), participant_result->space());
-  if (!claim_result) return fail(claim_result.error(), common::kExitBroken);
+  if (!claim_result) return fail(claim_result.error());
 
   try {
     SimulatedWorld world(*participant_result, *world_result, options);
     spdlog::info("world '{}' of {} objects on domain {}, uncertainty {}", scene_result->name,
                  scene_result->objects.size(), participant_result->domain(), level);
-    if (auto ok = world.run(signal.token()); !ok) return fail(ok.error(), common::kExitBroken);
+    if (auto ok = world.run(signal.token()); !ok) return fail(ok.error());
     return common::kExitOk;
   } catch (const wire::SetupError& error) {
-    return fail({Code::kUnavailable, error.what()}, common::kExitBroken);
+    return fail({Code::kUnavailable, error.what()});
   }
 }

@@ -22,5 +22,18 @@ TEST(ParseWhole, TakesNothingElse) {
   EXPECT_FALSE((parse_whole<std::uint16_t>("65536", 1, UINT16_MAX)));
 }
 
+TEST(ParseNumber, TakesFiniteDecimalNumbersOnly) {
+  EXPECT_EQ(parse_number("050"), 50.0);
+  EXPECT_EQ(parse_number("-1e-3"), -0.001);
+  EXPECT_EQ(parse_number(".5"), 0.5);
+  for (const char* text : {"", " 5", "5 ", "+5", "0x10", "1e999", "inf", "nan", "NAN", "-inf", "1_000", "1e", "e", "."})
+    EXPECT_FALSE(parse_number(text)) << text;
+}
+
+TEST(WithoutPlus, LeavesEverythingElse) {
+  EXPECT_EQ(without_plus("+5"), "5");
+  for (const char* text : {"5", "-5", "+-5", "++5", "+", ""}) EXPECT_EQ(without_plus(text), text);
+}
+
 }  // namespace
 }  // namespace jostle

@@ -32,7 +32,7 @@ TEST(NetworkFile, ComesBackBitForBit) {
 TEST(NetworkFile, ThatIsNotThereIsNamed) {
   const auto sut = load_network("/nowhere/a.net");
   ASSERT_FALSE(sut);
-  EXPECT_EQ(sut.error().code, Code::kIo);
+  EXPECT_EQ(sut.error().code, Code::kNotFound);
   EXPECT_THAT(sut.error().message, AllOf(HasSubstr("/nowhere/a.net"), HasSubstr("jostle train-coarse fit")));
 }
 

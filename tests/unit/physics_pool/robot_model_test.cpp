@@ -9,6 +9,7 @@
 #include <functional>
 #include <limits>
 
+#include "idl/text/yaml_fields.hpp"
 #include "physics_pool/robot/robot_yaml.hpp"
 #include "tests/support/arms.hpp"
 #include "tests/support/temp_folder.hpp"

@@ -115,7 +115,7 @@ TEST(SceneYaml, LoadsWhatWasWrittenToAFile) {
 TEST(SceneYaml, NamesTheFileThatCannotBeRead) {
   const auto scene = load_scene("no/such/scene.yaml");
   ASSERT_FALSE(scene);
-  EXPECT_EQ(scene.error().code, Code::kIo);
+  EXPECT_EQ(scene.error().code, Code::kNotFound);
   EXPECT_THAT(scene.error().message, HasSubstr("no/such/scene.yaml"));
 }
 

@@ -7,6 +7,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "services/common/terminal/fitted_line.hpp"
 #include "services/common/terminal/progress_line.hpp"
 
 namespace jostle::common {
@@ -77,6 +78,22 @@ TEST(LiveLine, WipesWhatItHasDrawnAndNothingElse) {
   EXPECT_EQ(error.text(), "\rone\033[K\r\033[K");
 }
 
+TEST(LiveLine, OnATerminalThatIsDumbOnlyPlainLinesAreDrawn) {
+  const char* terminal = std::getenv("TERM");
+  const std::string before = terminal ? terminal : "xterm";
+  setenv("TERM", "dumb", 1);
+  const StandardError error(true);
+  {
+    LiveLine silent("jostle test"), sut("jostle test", PlainLines::kElsewhere);
+    silent.draw("nothing");
+    sut.draw("one");
+    sut.draw("two");
+    sut.wipe();
+  }
+  setenv("TERM", before.c_str(), 1);
+  EXPECT_EQ(error.text(), "one\r\ntwo\r\n");
+}
+
 TEST(LiveLine, WhereThereIsNoTerminalOnlyPlainLinesAreDrawn) {
   const StandardError error(false);
   LiveLine silent("jostle test"), sut("jostle test", PlainLines::kElsewhere);
@@ -111,6 +128,15 @@ TEST(ProgressLine, IsWipedAtTheEndIfSoAsked) {
   const StandardError error(true);
   { ProgressLine({.doing = "testing", .unit = "steps", .wiped = true}).show(0, 9); }
   EXPECT_EQ(error.text(), "\rtesting: 0 of 9 step\033[K\r\033[K");
+}
+
+TEST(FittedLine, LeavesOutTheLeastImportantUntilItFits) {
+  const std::vector<LinePart> parts{{"12 s planning", 0}, {"cost 7", 2}, {"target 3 cm", 1}, {"a:1", 3}, {"b:2", 4}};
+  EXPECT_EQ(fitted_line(parts, 80), "12 s planning  cost 7  target 3 cm  a:1  b:2");
+  EXPECT_EQ(fitted_line(parts, 43), "12 s planning  cost 7  target 3 cm  a:1");
+  EXPECT_EQ(fitted_line(parts, 30), "12 s planning  target 3 cm");
+  EXPECT_EQ(fitted_line(parts, 5), "12 s planning");
+  EXPECT_EQ(fitted_line({}, 5), "");
 }
 
 TEST(ProgressText, SaysShareRateAndTimeLeftWhileTheyAreKnown) {

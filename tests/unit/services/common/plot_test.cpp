@@ -64,7 +64,7 @@ TEST(Plot, SaysWhatIsMissingWithoutGnuplot) {
   const Path empty("/nowhere");
   const auto drawn = plot("/tmp/never.png", "", made_up_panels());
   ASSERT_FALSE(drawn);
-  EXPECT_EQ(drawn.error().code, Code::kNotFound);
+  EXPECT_EQ(drawn.error().code, Code::kUnavailable);
   EXPECT_THAT(drawn.error().message, testing::HasSubstr("gnuplot-nox"));
 }
 

@@ -199,7 +199,7 @@ INSTANTIATE_TEST_SUITE_P(EveryKind, BadParameters, testing::ValuesIn(kCases),
 TEST(Parameters, NameTheFileThatCannotBeRead) {
   const auto result = load_parameters("no/such/file.yaml");
   ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().code, Code::kIo);
+  EXPECT_EQ(result.error().code, Code::kNotFound);
   EXPECT_THAT(result.error().message, HasSubstr("no/such/file.yaml"));
 }
 

@@ -129,8 +129,8 @@ TEST_F(IdentityFolder, WithAFileThatCannotBeReadIsRefusedNamingTheFile) {
     fs::copy(arm, copy);
     fs::remove(copy / name);
     fs::create_directory(copy / name);  // permission bits would not stop root
-    expect_refused(copy, {(copy / name).string() + ": cannot be read", "directory"});
-    EXPECT_EQ(open_identity(copy).error().code, Code::kIo);
+    expect_refused(copy, {(copy / name).string() + ": cannot be read", "folder"});
+    EXPECT_EQ(open_identity(copy).error().code, Code::kInvalidArgument);
   }
 }
 

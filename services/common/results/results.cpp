@@ -1,11 +1,16 @@
 #include "services/common/results/results.hpp"
 
+#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <sys/utsname.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <ctime>
 #include <fstream>
 #include <string>
@@ -15,6 +20,8 @@
 #include "services/common/process/files.hpp"
 
 namespace jostle::common {
+
+namespace fs = std::filesystem;
 
 extern const char* const kCommit;  // deploy/cmake/Commit.cmake writes it
 
@@ -72,10 +79,34 @@ nlohmann::json provenance() {
           {"seconds", duration.count()}};
 }
 
+nlohmann::json number_or_null(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
+
+Result<void> check_output(const fs::path& file) {
+  const auto problem = [&](const std::string& what) {
+    return Error{Code::kIo, fmt::format("{}: cannot be written: {}", file.string(), what)};
+  };
+  if (file == "-") return {};  // standard output
+  std::error_code ignored;
+  const fs::file_status status = fs::status(file, ignored);
+  if (fs::is_directory(status)) return problem("it is a folder; wanted a file");
+  if (fs::exists(status) && access(file.c_str(), W_OK) != 0) return problem(std::strerror(errno));
+  if (fs::exists(status) && !fs::is_regular_file(status)) return {};  // a device or a pipe
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  if (!fs::is_directory(folder, ignored))
+    return problem(fmt::format("there is no folder {}; make it", folder.string()));
+  std::string draft = file.string() + ".XXXXXX";  // only an attempt tells: root may write where nothing can be made
+  const int made = mkostemp(draft.data(), O_CLOEXEC);
+  if (made < 0) return problem(std::strerror(errno));
+  close(made);
+  unlink(draft.c_str());
+  return {};
+}
+
 Result<void> write_results(const std::filesystem::path& file, nlohmann::json results) {
   if (!results.is_object()) results = {{"results", std::move(results)}};
   results["provenance"] = provenance();
-  return write_text(file, results.dump(1) + "\n");
+  // Names of files may be no UTF-8; hours of work must not be lost for that.
+  return write_text(file, results.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace jostle::common

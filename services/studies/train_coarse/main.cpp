@@ -8,6 +8,7 @@
 #include "physics_pool/local/thread_pool.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
+#include "services/common/results/results.hpp"
 #include "services/common/terminal/progress_line.hpp"
 #include "services/pool/client/remote_pool.hpp"
 #include "services/studies/train_coarse/collect.hpp"
@@ -75,6 +76,7 @@ int collect_data(Arguments& arguments, std::stop_token stop) {
 }
 
 int fit_network(Arguments& arguments, std::stop_token stop) {
+  if (auto ok = common::check_output(arguments.net); !ok) return fail({Code::kInvalidArgument, ok.error().message});
   const auto start = std::chrono::steady_clock::now();
   const auto data_result = read_transitions(arguments.data);
   if (!data_result) return fail(data_result.error());

@@ -28,6 +28,9 @@ struct Problem {
   std::uint32_t stream = 0;  ///< first noise stream; one is used per iteration
   physics_pool::Objective objective = physics_pool::Objective::standard();
   physics_pool::Priority priority = physics_pool::Priority::kNormal;  ///< of its rollouts; changes no plan
+  /// Where the planner counts rollouts when it asks for them, so that those of a plan that fails are known as well;
+  /// null: nowhere. Whoever sets it keeps it until the planner returns.
+  std::uint64_t* rollouts_asked_for = nullptr;
 };
 
 /// The best sequence found, even if it does not reach the goal.

@@ -61,7 +61,10 @@ Result<void> Execution::plan(const ControlSequence& initial, int iterations, con
                              std::vector<double> u_before) {
   notify(Phase::kPlanning);
   const auto before = Clock::now();
-  if (rollouts_left() == 0) return Error{Code::kDeadline, "task: out of rollouts"};
+  if (rollouts_left() == 0) {
+    is_out_of_rollouts_ = true;
+    return Error{Code::kDeadline, "task: out of rollouts"};
+  }
   auto start_result = setup_.make_feasible ? setup_.make_feasible(x_) : Result<State>(x_);
   if (!start_result) return start_result.error();
   Problem problem{.world = setup_.world,
@@ -75,14 +78,19 @@ Result<void> Execution::plan(const ControlSequence& initial, int iterations, con
                   .objective = objective,
                   // From the first action on a robot stands still for as long as this takes.
                   .priority = outcome_.actions > 0 ? physics_pool::Priority::kUrgent : physics_pool::Priority::kNormal};
+  std::uint64_t asked_for = 0;
+  problem.rollouts_asked_for = &asked_for;
   auto plan_result = setup_.planner.plan(problem, deadline_, stop_);
-  if (!plan_result) return plan_result.error();
+  outcome_.planning_time += Clock::now() - before;
+  if (!plan_result) {
+    outcome_.rollouts += asked_for;
+    return plan_result.error();
+  }
   plan_ = std::move(plan_result).value();
   acted_at_plan_ = outcome_.actions;
   stream_ += static_cast<std::uint32_t>(iterations);
   outcome_.rollouts += plan_.rollouts;
   outcome_.iterations += plan_.iterations;
-  outcome_.planning_time += Clock::now() - before;
   if (!planned_) {
     planned_ = true;
     outcome_.first_plan = plan_;
@@ -111,7 +119,7 @@ Result<Outcome> Execution::end(const Result<void>& ended) {
   outcome_.total_time = Clock::now() - start_;
   if (!ended) {
     if (ended.error().code != Code::kDeadline) return ended.error();
-    outcome_.conclude(Ending::kTimedOut, rollouts_left() == 0
+    outcome_.conclude(Ending::kTimedOut, is_out_of_rollouts_
                                              ? fmt::format("all {} rollouts are spent", setup_.limits.rollouts)
                                              : fmt::format("timeout after {:.0f} s", outcome_.total_time.count()));
   }

@@ -76,10 +76,12 @@ struct Outcome {
   Plan first_plan;
   int replans = 0;
   int actions = 0;
-  std::uint64_t rollouts = 0;                     ///< over all plans
-  int iterations = 0;                             ///< over all plans
-  std::chrono::duration<double> plan_time{};      ///< time that the first plan took
-  std::chrono::duration<double> planning_time{};  ///< time that all plans took
+  /// Over all plans. One that ran out of time counts with every rollout that it asked for, though some of the last
+  /// ones may not have been finished.
+  std::uint64_t rollouts = 0;
+  int iterations = 0;                             ///< over all plans that were finished
+  std::chrono::duration<double> plan_time{};      ///< time that the first plan took; 0 if it never came to be
+  std::chrono::duration<double> planning_time{};  ///< time that all plans took, with one that ran out of time
   std::chrono::duration<double> total_time{};
   Trajectory observed;  ///< before the first action and after each
   std::vector<std::string> dropped;
@@ -143,6 +145,7 @@ class Execution {
   robot_bridge::RobotReading reading_;
   Plan plan_;
   bool planned_ = false;
+  bool is_out_of_rollouts_ = false;
   std::uint32_t stream_ = 0;
   int acted_at_plan_ = -1;  // actions executed when the present plan was made
   Outcome outcome_;

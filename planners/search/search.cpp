@@ -41,9 +41,10 @@ RolloutBatch Search::around(const ControlSequence& nominal) const {
 }
 
 Result<BatchReply> Search::run(const RolloutBatch& batch) {
+  best_.rollouts += batch.samples;
+  if (problem_.rollouts_asked_for) *problem_.rollouts_asked_for += batch.samples;
   auto reply_result = pool_.run(batch, deadline_, stop_);
   if (!reply_result) return reply_result;
-  best_.rollouts += batch.samples;
   for (const RolloutOutcome& outcome : reply_result->outcomes) {
     if (outcome.end == End::kDiverged) divergence_ = outcome.reason;
   }

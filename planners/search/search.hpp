@@ -28,7 +28,7 @@ class Search {
   /// best cost as the one to beat.
   physics_pool::RolloutBatch around(const ControlSequence& nominal) const;
 
-  /// Runs a batch and counts its rollouts.
+  /// Runs a batch and counts its rollouts, also if it fails.
   Result<physics_pool::BatchReply> run(const physics_pool::RolloutBatch& batch);
 
   /// Keeps the winner of a batch, if it has one.

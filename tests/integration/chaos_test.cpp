@@ -41,9 +41,25 @@ TEST_F(Chaos, LeavesEveryPlanBitEqual) {
   EXPECT_THAT(sut->out(), HasSubstr("all bit-equal  yes"));
 }
 
-TEST_F(Chaos, IsSeededAndCountedOnlyWhereItMakesSense) {
-  EXPECT_EQ(finish({"pool-threads", "--seed", "1"}), 2);
-  EXPECT_THAT(sut->err(), HasSubstr("--seed, --faults"));
+TEST_F(Chaos, SaysWhatHappenedUntilItWasInterrupted) {
+  const std::string file = folder.path() / "chaos.json";
+  sut = std::make_unique<ProgramProcess>("jostle_bench",
+                                         std::vector<std::string>{"chaos", "--faults", "100000", "--json", file,
+                                                                  "--domain", std::to_string(test_domain())},
+                                         folder, ProgramProcess::Environment{{"TMPDIR", folder.path()}});
+  const auto has_killed = [&] { return children_of(sut->pid()).size() >= 4; };
+  ASSERT_TRUE(soon(120s, has_killed)) << sut->err();
+  ASSERT_TRUE(sut->says("plans, the longest", 120s)) << sut->err();  // a line each half minute
+  sut->signal(SIGINT);
+
+  ASSERT_EQ(sut->wait(60s), 130) << sut->err();
+
+  EXPECT_THAT(sut->err(), HasSubstr("jostle bench: interrupted"));
+  EXPECT_THAT(sut->out(), HasSubstr("Partial: "));
+  EXPECT_EQ(json::parse(contents(file))["partial"]["of"], 100000);
+}
+
+TEST_F(Chaos, HasItsOwnOptions) {
   EXPECT_EQ(finish({"chaos", "--workers", "2,3"}), 2);
   EXPECT_THAT(sut->err(), HasSubstr("--workers"));
 }

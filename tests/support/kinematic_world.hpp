@@ -97,7 +97,10 @@ class KinematicPlanner final : public planners::Planner {
                               std::stop_token = {}) override {
     problems.push_back(problem);
     deadlines.push_back(deadline);
-    if (error) return *error;
+    if (error) {
+      if (problem.rollouts_asked_for) *problem.rollouts_asked_for += rollouts_before_error;
+      return *error;
+    }
     planners::Plan plan;
     plan.controls = problem.initial;
     plan.states = {problem.x0};
@@ -115,6 +118,7 @@ class KinematicPlanner final : public planners::Planner {
   double step_duration = 1.0;
   bool predicts_goal = true;
   std::optional<Error> error;
+  std::uint64_t rollouts_before_error = 0;
   std::function<void(planners::Plan&, int plans)> change;
   std::vector<planners::Problem> problems;
   std::vector<planners::TimePoint> deadlines;

@@ -13,10 +13,9 @@ namespace {
 namespace fs = std::filesystem;
 
 // Pixels.
-constexpr int kLanes = 1000, kAbove = 60, kBelow = 75, kFont = 14;
+constexpr int kLanes = 1000, kAbove = 60, kBelow = 75;
 constexpr int kLeastHeight = 180, kMostHeight = 900;  // of all lanes; the legend needs the least
 constexpr int kThick = 40, kThin = 14;                // a lane, where there are few and where there are many
-constexpr int kCharacter = 9;                         // width, about
 constexpr double kBar = 0.38;                         // half of a bar's height, in lanes
 
 constexpr std::size_t kColourCount = kColours.size() - 1;  // black is for text
@@ -25,12 +24,6 @@ const char* colour_of(int series) { return kColours[1 + static_cast<std::size_t>
 
 Error wrong(const std::string& got, const std::string& wanted) {
   return {Code::kInvalidArgument, fmt::format("picture: got {}, wanted {}", got, wanted)};
-}
-
-Result<std::string> terminal_of(const fs::path& picture) {
-  if (picture.extension() == ".png") return std::string("pngcairo noenhanced");
-  if (picture.extension() == ".svg") return std::string("svg noenhanced");
-  return wrong(fmt::format("'{}'", picture.string()), "a name that ends in .png or .svg");
 }
 
 Result<void> check(const LaneChart& chart) {
@@ -67,7 +60,12 @@ std::string ground_of(const LaneChart& chart) {
   return text;
 }
 
-std::string frame_of(const fs::path& picture, const std::string& terminal, const LaneChart& chart) {
+struct Size {
+  int width = 0, height = 0;  // pixels
+};
+
+// Everything but the bars, and how large the picture is.
+std::pair<std::string, Size> frame_of(const LaneChart& chart) {
   const auto count = static_cast<int>(chart.lanes.size());
   const int thickness = std::clamp(kMostHeight / count, kThin, kThick);
   const int lanes = std::max(kLeastHeight, count * thickness);
@@ -77,26 +75,24 @@ std::string frame_of(const fs::path& picture, const std::string& terminal, const
     longest = std::max(longest, chart.lanes[i].size());
     names += fmt::format("{}{} {}", i ? ", " : "", quoted(chart.lanes[i]), i);
   }
-  const int left = 25 + kCharacter * static_cast<int>(longest);
+  const int left = 25 + kCharacterWidth * static_cast<int>(longest);
   std::size_t longest_series = std::max(chart.hatched.size(), sizeof "idle");
   for (const std::string& name : chart.series) longest_series = std::max(longest_series, name.size());
-  const int legend = 85 + kCharacter * static_cast<int>(longest_series);
+  const int legend = 85 + kCharacterWidth * static_cast<int>(longest_series);
   const int width = left + kLanes + legend, height = kAbove + lanes + kBelow;
   const auto across = [&](int pixels) { return static_cast<double>(pixels) / width; };
   const auto up = [&](int pixels) { return static_cast<double>(pixels) / height; };
-  return fmt::format(
-      "set terminal {} size {},{} font 'DejaVu Sans,{}' background '#ffffff'\n"
-      "set output {}\n"
+  const std::string text = fmt::format(
       "set lmargin at screen {}\nset rmargin at screen {}\nset bmargin at screen {}\nset tmargin at screen {}\n"
       "set border 1 lc rgb '#666666'\nset tics nomirror out textcolor rgb '#222222'\n"
       "set xrange [0:{:.9g}]\nset yrange [{}:-0.5]\nset xlabel {}\nset ytics scale 0 ({}) font ',{}'\n"
       "set grid noytics xtics front lt 1 lc rgb '#bbbbbb' lw 0.5\n"
       "set key at screen {},{} left top vertical Left reverse samplen 1.5 spacing 1.4 textcolor rgb '#222222'\n"
       "set label 1 {} at screen {},{} left font ',{}'\n",
-      terminal, width, height, kFont, quoted(picture.string()), across(left), across(left + kLanes), up(kBelow),
-      up(kBelow + lanes), chart.length, count - 0.5, quoted(chart.x_label), names, std::min(kFont, thickness),
-      across(left + kLanes + 20), up(kBelow + lanes), quoted(chart.title), across(left),
-      up(kBelow + lanes + kAbove / 2), kFont + 2);
+      across(left), across(left + kLanes), up(kBelow), up(kBelow + lanes), chart.length, count - 0.5,
+      quoted(chart.x_label), names, std::min(kFont, thickness), across(left + kLanes + 20), up(kBelow + lanes),
+      quoted(chart.title), across(left), up(kBelow + lanes + kAbove / 2), kFont + 2);
+  return {text, {width, height}};
 }
 
 // One plot of boxes, with its data before it; an entry of the legend alone without data.
@@ -118,7 +114,8 @@ struct Layers {
   int count = 0;
 };
 
-std::string script_of(const fs::path& picture, const std::string& terminal, const LaneChart& chart) {
+// The bars, the ground and the legend.
+std::string plot_of(const LaneChart& chart) {
   constexpr const char* kIdle = "fc rgb '#e9e9e9' fs solid noborder";
   Layers layers;
   layers.add(ground_of(chart), kIdle, "");
@@ -131,22 +128,16 @@ std::string script_of(const fs::path& picture, const std::string& terminal, cons
   }
   if (!chart.hatched.empty()) layers.add("", "fc rgb '#444444' fs pattern 4 border lc rgb '#444444'", chart.hatched);
   layers.add("", kIdle, "idle");
-  return frame_of(picture, terminal, chart) + layers.data + "plot " + layers.plots.substr(0, layers.plots.size() - 2) +
-         "\nunset output\n";
+  return layers.data + "plot " + layers.plots.substr(0, layers.plots.size() - 2) + "\n";
 }
 
 }  // namespace
 
-Result<void> check_picture(const fs::path& picture) {
-  if (auto terminal_result = terminal_of(picture); !terminal_result) return terminal_result.error();
-  return {};
-}
-
 Result<void> draw(const fs::path& picture, const LaneChart& chart) {
-  auto terminal_result = terminal_of(picture);
-  if (!terminal_result) return terminal_result.error();
+  if (auto ok = check_picture(picture); !ok) return ok;
   if (auto ok = check(chart); !ok) return ok;
-  return run_gnuplot(picture, script_of(picture, *terminal_result, chart));
+  const auto [frame, size] = frame_of(chart);
+  return run_gnuplot(picture, size.width, size.height, frame + plot_of(chart));
 }
 
 }  // namespace jostle::common

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "idl/types/result.hpp"
+#include "services/common/charts/gnuplot.hpp"
 
 namespace jostle::common {
 
@@ -25,11 +26,7 @@ struct LaneChart {
   std::vector<Bar> bars;
 };
 
-/// Whether `draw` can make a picture of this name, to be known before the work.
-/// Error kInvalidArgument naming the endings.
-Result<void> check_picture(const std::filesystem::path& picture);
-
-/// Draws a PNG or, if the file's name ends so, an SVG.
+/// Draws a PNG, SVG or PDF, as the ending of the file's name says.
 /// Errors   kInvalidArgument  another ending, no lanes, a length that is not positive, or
 ///                            a bar in no lane or series
 ///          kNotFound, kIo    see run_gnuplot

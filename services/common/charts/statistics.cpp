@@ -1,5 +1,7 @@
 #include "services/common/charts/statistics.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -16,6 +18,7 @@ double binomial(double n, double i) {
 }  // namespace
 
 double quantile(std::vector<double> values, double p) {
+  if (values.empty()) return kNone;
   std::ranges::sort(values);
   const double place = p * static_cast<double>(values.size() - 1);
   const auto below = static_cast<std::size_t>(place);
@@ -24,6 +27,7 @@ double quantile(std::vector<double> values, double p) {
 }
 
 Interval median_interval(std::vector<double> values) {
+  if (values.empty()) return {};
   std::ranges::sort(values);
   const std::size_t n = values.size();
   std::size_t outside = 0;  // values left out on each side
@@ -42,8 +46,8 @@ Mean mean_of(const std::vector<double>& values) {
   double sum = 0.0, squares = 0.0;
   for (const double value : values) sum += value;
   for (const double value : values) squares += (value - sum / n) * (value - sum / n);
-  const double deviation = n > 1 ? std::sqrt(squares / (n - 1)) : 0.0;
-  return {.value = sum / n, .half_width = 1.96 * deviation / std::sqrt(n)};
+  const double half_width = n > 1 ? 1.96 * std::sqrt(squares / (n - 1) / n) : kNone;
+  return {.count = static_cast<int>(values.size()), .value = sum / n, .half_width = half_width};
 }
 
 Share wilson_interval(int successes, int runs) {
@@ -55,6 +59,20 @@ Share wilson_interval(int successes, int runs) {
   // If none or all succeed, a bound is 0 or 1, but for rounding.
   return {
       .successes = successes, .runs = runs, .low = std::max(centre - half, 0.0), .high = std::min(centre + half, 1.0)};
+}
+
+std::string number_text(double value, int digits) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "-";
+}
+
+std::string to_text(const Mean& mean, int digits) {
+  if (!std::isfinite(mean.half_width)) return number_text(mean.value, digits);
+  return number_text(mean.value, digits) + " ± " + number_text(mean.half_width, digits);
+}
+
+std::string interval_text(double low, double high) {
+  if (!std::isfinite(low) || !std::isfinite(high)) return "-";
+  return number_text(low, 2) + " to " + number_text(high, 2);
 }
 
 }  // namespace jostle::common

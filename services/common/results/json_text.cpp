@@ -14,7 +14,8 @@ bool fits_a_line(const json& value) {
 
 void write(const json& value, std::size_t depth, std::string& out) {
   if (fits_a_line(value)) {
-    out += value.dump();
+    // Names of files may be no UTF-8; hours of work must not be lost for that.
+    out += value.dump(-1, ' ', false, json::error_handler_t::replace);
     return;
   }
   const std::string indent(depth + 1, ' ');
@@ -22,7 +23,7 @@ void write(const json& value, std::size_t depth, std::string& out) {
   const char* separator = "\n";
   for (const auto& [key, part] : value.items()) {
     out += separator + indent;
-    if (value.is_object()) out += json(key).dump() + ": ";
+    if (value.is_object()) out += json(key).dump(-1, ' ', false, json::error_handler_t::replace) + ": ";
     write(part, depth + 1, out);
     separator = ",\n";
   }

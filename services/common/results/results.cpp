@@ -5,6 +5,7 @@
 #include <sys/utsname.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
@@ -72,6 +73,8 @@ nlohmann::json provenance() {
           {"began", fmt::format("{:%FT%TZ}", fmt::gmtime(began))},
           {"seconds", duration.count()}};
 }
+
+nlohmann::json number_or_null(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
 
 Result<void> write_results(const std::filesystem::path& file, nlohmann::json results) {
   if (!results.is_object()) results = {{"results", std::move(results)}};

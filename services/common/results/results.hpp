@@ -18,6 +18,9 @@ nlohmann::json provenance();
 /// Error kIo naming the file.
 Result<void> write_results(const std::filesystem::path& file, nlohmann::json results);
 
+/// Makes a number for JSON; null if it is not finite.
+nlohmann::json number_or_null(double value);
+
 /// Returns what floating-point results may depend on, such as "x86_64, AMD EPYC 7B13".
 std::string processor();
 

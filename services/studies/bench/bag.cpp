@@ -162,18 +162,19 @@ class BagSides {
 
 }  // namespace
 
-Result<Measurements> measure_bag(const Settings& settings) {
+Result<void> measure_bag(const Settings& settings) {
   const auto folder_result = common::make_temporary_folder("bench");
   if (!folder_result) return folder_result.error();
   const std::vector<std::byte> bytes = make_messages();
-  const auto measure = [&]() -> Result<Measurements> {
-    Measurements measurements;
-    for (const Kind& kind : {Kind{"mcap zstd", {}}, Kind{"mcap raw", {.compress = false}},
-                             Kind{"sqlite3", {.storage = bags::BagOptions::Storage::kSqlite}}}) {
+  const Kind kinds[] = {{"mcap zstd", {}},
+                        {"mcap raw", {.compress = false}},
+                        {"sqlite3", {.storage = bags::BagOptions::Storage::kSqlite}}};
+  settings.announce(static_cast<int>(std::size(kinds)));
+  const auto measure = [&]() -> Result<void> {
+    for (const Kind& kind : kinds) {
       BagSides sides(bytes, *folder_result);
       auto measurement_result = compare({kind.name, [&] { return sides.write_bag(kind.options); }},
-                                        {"bare appends", [&] { return sides.write_bare(); }},
-                                        {.repeats = settings.repeats, .stop = settings.stop});
+                                        {"bare appends", [&] { return sides.write_bare(); }}, settings.turns());
       if (!measurement_result) return measurement_result.error();
       measurement_result->name = fmt::format("bag, {}", kind.name);
       measurement_result->unit = "messages/s";
@@ -182,14 +183,14 @@ Result<Measurements> measure_bag(const Settings& settings) {
                                      {"read back, messages/s", common::median(sides.read_rates)},
                                      {"size of the bag, of the bytes in it",
                                       static_cast<double>(sides.bag_bytes) / static_cast<double>(bytes.size())}};
-      measurements.push_back(std::move(*measurement_result));
+      settings.keep(*std::move(measurement_result));
     }
-    return measurements;
+    return {};
   };
-  auto measurements = measure();
+  auto measured = measure();
   std::error_code ignored;
   fs::remove_all(*folder_result, ignored);
-  return measurements;
+  return measured;
 }
 
 }  // namespace jostle::studies

@@ -3,75 +3,90 @@
 /// Everything that can be measured. docs/benchmarks.md says why.
 
 #include <chrono>
-#include <functional>
 #include <stop_token>
-#include <string>
+#include <utility>
 #include <vector>
 
 #include "services/studies/bench/measurement.hpp"
+#include "services/studies/progress/work_line.hpp"
 
 namespace jostle::studies {
 
-/// How to measure, as the command line says it.
+using Measurements = std::vector<Measurement>;
+
+/// How to measure, as the command line says it, and whom to tell.
 struct Settings {
-  int repeats = 0;           ///< >= 1
+  int repeats = 1;           ///< >= 1
   std::vector<int> workers;  ///< for `scheduling`: numbers of processes, one measurement each
   int domain = 0;            ///< DDS domain; nobody else uses it, or the next one
   std::stop_token stop;
-  std::function<void(const std::string& line)> on_news;  ///< called while it takes long; never empty
-};
+  WorkLine* line = nullptr;      ///< where it is shown how far the work has come; never null
+  Measurements* done = nullptr;  ///< where a finished measurement is kept at once; never null
 
-using Measurements = std::vector<Measurement>;
+  /// Says how many measurements there will be.
+  void announce(int measurements) const { line->expect(static_cast<std::size_t>(measurements * turns().runs())); }
+  Turns turns() const {
+    return {.repeats = repeats, .stop = stop, .on_run = [this] { line->step(); }};
+  }
+  /// Keeps a measurement, and says what came of it.
+  void keep(Measurement measurement) const {
+    line->news(one_line(measurement));
+    done->push_back(std::move(measurement));
+  }
+};
 
 /// The longest that one run of one side may take: a pool that is slower hangs.
 inline constexpr std::chrono::minutes kPatience{5};
 
+// Each of the following keeps its measurements one by one, so that those that are finished are not lost with one that
+// fails. Their errors are those of what is measured, and kCancelled after a stop request.
+
 /// Measures ThreadPool against as many bare loops of engine steps, steps/s.
-Result<Measurements> measure_pool_threads(const Settings& settings);
+Result<void> measure_pool_threads(const Settings& settings);
 
 /// Measures RemotePool with two worker processes against two bare loops, steps/s.
-Result<Measurements> measure_pool_dds(const Settings& settings);
+Result<void> measure_pool_dds(const Settings& settings);
 
 /// Measures a batch of one empty sample through RemotePool and one worker against an
 /// echo over bare Fast DDS, microseconds.
-Result<Measurements> measure_round_trip(const Settings& settings);
+Result<void> measure_round_trip(const Settings& settings);
 
 /// Measures a batch with stop_losers against the same batch without, rollouts/s.
-Result<Measurements> measure_early_stop(const Settings& settings);
+Result<void> measure_early_stop(const Settings& settings);
 
 /// Measures worker processes that wait instead of simulating: the time their waiting
 /// takes when nobody idles, against the time the batch took.
-Result<Measurements> measure_scheduling(const Settings& settings);
+Result<void> measure_scheduling(const Settings& settings);
 
 /// Measures the same with the workers spread over hosts.
-Result<Measurements> measure_hosts_scheduling(const Settings& settings);
+Result<void> measure_hosts_scheduling(const Settings& settings);
 
 /// Measures round trips and throughput between two hosts over a good and a bad link, through a
 /// protected and an unprotected domain, microseconds and MB/s.
-Result<Measurements> measure_hosts(const Settings& settings);
+Result<void> measure_hosts(const Settings& settings);
 
 /// Measures batches like a plan's, whose samples wait instead of simulating, while one of two hosts
 /// of workers is unplugged for a while, against the same left alone, seconds.
-Result<Measurements> measure_unplugged(const Settings& settings);
+Result<void> measure_unplugged(const Settings& settings);
 
 /// Measures one step of 1 s of every coarse model against one of the fine model, microseconds.
 /// The sides answer the same question, and give different answers.
-Result<Measurements> measure_coarse_models(const Settings& settings);
+Result<void> measure_coarse_models(const Settings& settings);
 
 /// Measures one trajectory by Parareal on all processors against the serial fine model's time
 /// divided by the speed-up that Eq. 6.4 allows for so many.
-Result<Measurements> measure_parareal(const Settings& settings);
+Result<void> measure_parareal(const Settings& settings);
 
 /// Measures the same over N worker processes that wait as long as a slice takes: what the
 /// exchange of slices costs, beyond Eq. 6.4, where there are processors enough.
-Result<Measurements> measure_parareal_scheduling(const Settings& settings);
+Result<void> measure_parareal_scheduling(const Settings& settings);
 
 /// Measures writing messages of 1 KiB into a bag of each kind against bare appends of the same bytes, messages/s.
-Result<Measurements> measure_bag(const Settings& settings);
+Result<void> measure_bag(const Settings& settings);
 
 /// Measures a bag of 1000 messages per second, played at rates from 0.1 to 10 by another process: the
 /// time it takes as heard here against the time it has in the bag, ms.
-Result<Measurements> measure_play(const Settings& settings);
+Result<void> measure_play(const Settings& settings);
 
 /// Is the other process of `round-trip`: answers every assignment until it is told to
 /// end. Returns the exit code.

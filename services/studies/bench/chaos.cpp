@@ -36,7 +36,6 @@ constexpr int kUndisturbed = 3;  // plans before the first fault
 constexpr std::chrono::seconds kPlanPatience{120};
 constexpr std::chrono::seconds kHang{20};    // beyond a deadline that should have ended it
 constexpr std::chrono::seconds kReturn{30};  // of all workers, after the last fault
-constexpr std::chrono::seconds kNewsEvery{5};
 
 // Carries out a schedule, on a thread of its own.
 class Saboteur {
@@ -173,9 +172,10 @@ struct Report {
   std::vector<double> undisturbed, disturbed;  // seconds of each plan
   Hash hash;                                   // of the undisturbed plan
   int unequal = 0;                             // plans
-  double returned = 0.0;                       // seconds from the last repair until every worker could be used
+  double returned = common::kNone;             // seconds from the last repair until every worker could be used
   double seconds = 0.0;                        // from the first fault to the last plan's end
   physics_pool::PoolStatus pool;
+  bool complete = false;  // no stop was requested
 
   int count(Fault::Kind kind) const { return static_cast<int>(std::ranges::count(schedule, kind, &Fault::kind)); }
 };
@@ -202,7 +202,9 @@ class Chaos {
       if (!ok) return ok.error();
     }
     const auto start = Clock::now();
-    if (auto ok = disturb(swarm, *plan_result); !ok) return ok.error();
+    const auto disturbed = disturb(swarm, *plan_result);
+    report_.complete = disturbed.has_value();
+    if (!disturbed && (!options_.stop.stop_requested() || report_.disturbed.empty())) return disturbed.error();
     report_.seconds = seconds_since(start);
     report_.pool = swarm.pool().status();
     return std::move(report_);
@@ -213,7 +215,10 @@ class Chaos {
     Saboteur saboteur(report_.schedule, swarm.helpers(), hosts_);
     const auto where = [&] { return saboteur.where(); };
     while (!saboteur.done()) {
-      if (auto ok = plan(again, report_.disturbed, where); !ok) return ok.error();
+      if (auto ok = plan(again, report_.disturbed, where); !ok) {
+        report_.schedule.resize(static_cast<std::size_t>(saboteur.faults()));
+        return ok;
+      }
       tell(saboteur);
     }
     if (!saboteur.result()) return saboteur.result().error();
@@ -236,33 +241,34 @@ class Chaos {
     watchdog_.expect_by(deadline, where);
     auto result = again.run(deadline, options_.stop);
     watchdog_.rest();
+    if (!result && options_.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
     if (!result) return at(result.error(), options_, where());
     if (report_.hash.empty()) report_.hash = result->hash;
     if (result->hash != report_.hash) {
       ++report_.unequal;
-      options_.on_news(fmt::format("WRONG: a plan differs from the first one, {}", where()));
+      options_.line->tell(fmt::format("WRONG: a plan differs from the first one, {}", where()));
     }
     seconds.push_back(result->value);
     return {};
   }
 
   void tell(const Saboteur& saboteur) {
-    if (Clock::now() < next_news_) return;
-    next_news_ = Clock::now() + kNewsEvery;
-    options_.on_news(fmt::format("{} of {} faults, {} plans, the longest {:.1f} s", saboteur.faults(), options_.faults,
-                                 report_.disturbed.size(), std::ranges::max(report_.disturbed)));
+    for (const int faults = saboteur.faults(); told_ < faults; ++told_) options_.line->step();
+    options_.line->news(
+        fmt::format("{} plans, the longest {:.1f} s", report_.disturbed.size(), std::ranges::max(report_.disturbed)));
   }
 
   const ChaosOptions& options_;
   const common::Hosts* const hosts_;
   Watchdog watchdog_;
   Report report_;
-  Clock::time_point next_news_;
+  int told_ = 0;  // faults
 };
 
 constexpr std::array kKinds{Fault::Kind::kKill, Fault::Kind::kStall, Fault::Kind::kUnplug};
 
 void print(const Report& report, const ChaosOptions& options) {
+  if (!report.complete) fmt::print("Partial: {} of {} faults.\n", report.schedule.size(), options.faults);
   fmt::print("chaos, seed {}: {} faults in {:.0f} s: {} kills, each replaced, {} stalls, {} unplugged hosts\n",
              options.seed, report.schedule.size(), report.seconds, report.count(Fault::Kind::kKill),
              report.count(Fault::Kind::kStall), report.count(Fault::Kind::kUnplug));
@@ -271,7 +277,8 @@ void print(const Report& report, const ChaosOptions& options) {
              common::median(report.undisturbed));
   fmt::print("  samples        {} handed out again, {} came twice or late\n", report.pool.reissued,
              report.pool.duplicates);
-  fmt::print("  workers        all {} usable {:.1f} s after the last repair\n", options.workers, report.returned);
+  if (report.complete)
+    fmt::print("  workers        all {} usable {:.1f} s after the last repair\n", options.workers, report.returned);
   fmt::print("  all bit-equal  {}  {}\n", report.unequal == 0 ? "yes" : fmt::format("NO: {} differ", report.unequal),
              to_string(report.hash));
 }
@@ -279,37 +286,41 @@ void print(const Report& report, const ChaosOptions& options) {
 nlohmann::json to_json(const Report& report, const ChaosOptions& options) {
   nlohmann::json faults = nlohmann::json::object();
   for (const Fault::Kind kind : kKinds) faults[to_string(kind)] = report.count(kind);
-  const nlohmann::json object{{"name", "chaos"},
-                              {"seed", options.seed},
-                              {"workers", options.workers},
-                              {"faults", faults},
-                              {"seconds", report.seconds},
-                              {"plans", report.disturbed.size()},
-                              {"unequal", report.unequal},
-                              {"hash", to_string(report.hash)},
-                              {"undisturbed_s", report.undisturbed},
-                              {"disturbed_s", report.disturbed},
-                              {"returned_s", report.returned},
-                              {"reissued", report.pool.reissued},
-                              {"duplicates", report.pool.duplicates}};
+  nlohmann::json object{{"name", "chaos"},
+                        {"seed", options.seed},
+                        {"workers", options.workers},
+                        {"faults", faults},
+                        {"seconds", report.seconds},
+                        {"plans", report.disturbed.size()},
+                        {"unequal", report.unequal},
+                        {"hash", to_string(report.hash)},
+                        {"undisturbed_s", report.undisturbed},
+                        {"disturbed_s", report.disturbed},
+                        {"returned_s", common::number_or_null(report.returned)},
+                        {"reissued", report.pool.reissued},
+                        {"duplicates", report.pool.duplicates}};
+  if (!report.complete) object["partial"] = {{"done", report.schedule.size()}, {"of", options.faults}};
   return object;
 }
 
 }  // namespace
 
 Result<bool> bench_chaos(const ChaosOptions& options) {
+  options.line->expect(static_cast<std::size_t>(options.faults));
   auto hosts_result = common::Hosts::make(1 + kWorkerHosts);
-  if (!hosts_result) options.on_news(fmt::format("nothing is unplugged: {}", hosts_result.error().message));
+  if (!hosts_result) options.line->tell(fmt::format("nothing is unplugged: {}", hosts_result.error().message));
   const common::Hosts* hosts = hosts_result ? hosts_result->get() : nullptr;
   std::optional<Result<Report>> result;
   const auto run = [&] { result = Chaos(options, hosts).run(); };
   hosts ? hosts->on(1, run) : run();
   if (!*result) return result->error();
   const Report& report = **result;
+  options.line->end();
   print(report, options);
   if (!options.json.empty()) {
     if (auto ok = common::write_results(options.json, to_json(report, options)); !ok) return ok.error();
   }
+  if (!report.complete) return Error{Code::kCancelled, "interrupted"};
   return report.unequal == 0;
 }
 

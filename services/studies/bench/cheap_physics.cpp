@@ -8,6 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 #include <thread>
 
 #include "physics_pool/local/execution_world.hpp"
@@ -16,11 +17,13 @@
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/results/results.hpp"
+#include "services/common/results/table.hpp"
 #include "services/task/config/parameters.hpp"
 
 namespace jostle::studies {
 namespace {
 
+using common::number_or_null;
 using physics_pool::End;
 using physics_pool::Fidelity;
 using physics_pool::Pool;
@@ -33,6 +36,11 @@ using std::chrono::steady_clock;
 
 constexpr double kMoved = 0.001;  // m; less is the engine settling
 constexpr std::chrono::hours kPatience{1};
+constexpr int kDemoObjects = 15;
+constexpr double kPeerWork = 5;  // of a peer's search, beside the others
+
+// What a search among so many objects takes, roughly, for the time that is left.
+double work_of(int objects) { return std::pow(objects, 1.5); }
 
 // A world and what a planner needs to begin.
 struct Task {
@@ -200,33 +208,66 @@ class Study {
       : pool_(pool), options_(options), stop_(std::move(stop)), results_(options.levers) {}
 
   Result<CheapPhysics> run() {
-    for (const int objects : options_.sizes) {
-      const int executed = objects == options_.executed_objects ? options_.executed_worlds : options_.worlds;
-      for (int seed = 1; seed <= std::max(options_.worlds, executed); ++seed) {
-        auto task_result = generated(pool_, objects, static_cast<std::uint64_t>(seed));
-        if (!task_result) return task_result.error();
-        if (seed <= options_.worlds && wants("speed")) {
-          if (auto ok = measure_speed(*task_result, objects); !ok) return ok.error();
-        }
-        if (seed <= options_.worlds && wants("truth")) {
-          if (auto ok = measure_truth(*task_result, objects); !ok) return ok.error();
-        }
-        if (seed > executed || !wants("success")) continue;
-        if (auto ok = measure_success(*task_result, objects); !ok) return ok.error();
-      }
-    }
-    for (const Scene& scene : wants("demo") ? options_.demo : std::vector<Scene>{}) {
-      if (auto ok = measure_demo(scene); !ok) return ok.error();
-    }
-    return CheapPhysics{.levers = results_.all(), .demo = std::move(demo_)};
+    announce();
+    const auto measured = measure_all();
+    if (!measured && !stop_.stop_requested()) return measured.error();
+    return CheapPhysics{.levers = results_.all(), .demo = std::move(demo_), .complete = measured.has_value()};
   }
 
  private:
   bool wants(const char* part) const { return std::ranges::find(options_.parts, part) != options_.parts.end(); }
 
+  int executed_worlds(int objects) const {
+    return objects == options_.executed_objects ? options_.executed_worlds : options_.worlds;
+  }
+
+  void announce() const {
+    if (!options_.line) return;
+    const std::size_t levers = options_.levers.size();
+    for (const int objects : options_.sizes) {
+      const auto expect = [&](const char* part, std::size_t steps) {
+        if (wants(part)) options_.line->expect(steps * levers, work_of(objects));
+      };
+      const auto worlds = static_cast<std::size_t>(options_.worlds);
+      expect("speed", worlds * static_cast<std::size_t>(options_.repeats));
+      expect("truth", worlds);
+      expect("success", static_cast<std::size_t>(executed_worlds(objects)));
+    }
+    if (wants("demo")) {
+      options_.line->expect(options_.demo.size() * static_cast<std::size_t>(options_.demo_seeds) * levers,
+                            work_of(kDemoObjects));
+    }
+  }
+
+  void step(int objects) const {
+    if (options_.line) options_.line->step("", work_of(objects));
+  }
+
   template <class... T>
   void tell(fmt::format_string<T...> format, T&&... values) const {
-    if (options_.on_news) options_.on_news(fmt::format(format, std::forward<T>(values)...));
+    if (options_.line) options_.line->news(fmt::format(format, std::forward<T>(values)...));
+  }
+
+  Result<void> measure_all() {
+    for (const int objects : options_.sizes) {
+      const int executed = executed_worlds(objects);
+      for (int seed = 1; seed <= std::max(options_.worlds, executed); ++seed) {
+        auto task_result = generated(pool_, objects, static_cast<std::uint64_t>(seed));
+        if (!task_result) return task_result.error();
+        if (seed <= options_.worlds && wants("speed")) {
+          if (auto ok = measure_speed(*task_result, objects); !ok) return ok;
+        }
+        if (seed <= options_.worlds && wants("truth")) {
+          if (auto ok = measure_truth(*task_result, objects); !ok) return ok;
+        }
+        if (seed > executed || !wants("success")) continue;
+        if (auto ok = measure_success(*task_result, objects); !ok) return ok;
+      }
+    }
+    for (const Scene& scene : wants("demo") ? options_.demo : std::vector<Scene>{}) {
+      if (auto ok = measure_demo(scene); !ok) return ok;
+    }
+    return {};
   }
 
   Result<void> measure_speed(const Task& task, int objects) {
@@ -236,7 +277,9 @@ class Study {
         auto speed_result = speed(pool_, task, options_.levers[i].options, options_, stop_);
         if (!speed_result) return speed_result.error();
         if (i == 0) plain = *speed_result;
-        if (repeat >= 0) results_.of(i, objects).ratios.push_back(*speed_result / plain);
+        if (repeat < 0) continue;
+        results_.of(i, objects).ratios.push_back(*speed_result / plain);
+        step(objects);
       }
       if (repeat < 0) tell("{:>2} objects, world {}: {:.1f} candidates/s with full physics", objects, task.seed, plain);
     }
@@ -256,6 +299,7 @@ class Study {
       const double rank = correlation(*full_result, *ranked_result);
       if (std::isfinite(rank)) result.correlations.push_back(rank);
       add_pose_errors(task.world->geometry().layout, *full_result, *chosen_result, result.pose_errors);
+      step(objects);
     }
     return {};
   }
@@ -283,6 +327,7 @@ class Study {
                           : plan.at_goal ? "misses"
                                          : "no plan",
                           timed_result->seconds);
+      step(objects);
     }
     tell("{} objects, world {}:{}", objects, task.seed, line);
     return {};
@@ -300,6 +345,7 @@ class Study {
                          .seed = task_result->seed,
                          .planned = timed_result->plan.at_goal,
                          .seconds = timed_result->seconds});
+        step(kDemoObjects);
       }
       tell("demo, seed {}", seed);
     }
@@ -325,14 +371,6 @@ std::vector<double> ranks(const std::vector<double>& values) {
     for (std::size_t i = begin; i < end; ++i) result[order[i]] = rank;
   }
   return result;
-}
-
-std::optional<double> median_or_none(const std::vector<double>& values) {
-  return values.empty() ? std::nullopt : std::optional(common::median(values));
-}
-
-nlohmann::json number_or_null(const std::optional<double>& value) {
-  return value ? nlohmann::json(*value) : nlohmann::json();
 }
 
 // Seconds that a lever took, by seed; a search that found nothing counts with its time.
@@ -374,31 +412,47 @@ Result<CheapPhysics> measure_cheap_physics(Pool& pool, const CheapPhysicsOptions
 }
 
 std::string to_text(const CheapPhysics& results) {
-  std::string text =
-      fmt::format("{:<11}{:>7}  {:<22}{:<8}{:<20}{:<24}{:<16}{}\n", "lever", "objects", "candidates/s, ratio", "rank",
-                  "pose error, mm", "success (95 %)", "time to plan", "denied  same plan");
+  std::vector<std::vector<std::string>> speed{
+      {"lever", "objects", "candidates/s, ratio", "rank", "pose error, mm: median, 90 %"}};
+  std::vector<std::vector<std::string>> success{
+      {"lever", "objects", "grasps", "95 % interval", "time to plan", "denied", "same plan"}};
   for (const LeverResult& r : results.levers) {
-    const common::Interval interval = r.ratios.empty() ? common::Interval{} : common::median_interval(r.ratios);
-    const auto rank = median_or_none(r.correlations), time = median_or_none(r.time_ratios);
+    const common::Interval interval = common::median_interval(r.ratios);
+    std::string ratio = common::number_text(common::median(r.ratios), 2);
+    if (r.ratios.size() > 1) ratio += fmt::format(" ({:.2f} .. {:.2f})", interval.low, interval.high);
+    if (!r.ratios.empty() || !r.correlations.empty() || !r.pose_errors.empty()) {
+      speed.push_back({r.name, std::to_string(r.objects), ratio, common::number_text(common::median(r.correlations), 2),
+                       common::number_text(1e3 * common::median(r.pose_errors), 2) + ", " +
+                           common::number_text(1e3 * common::quantile(r.pose_errors, 0.9), 1)});
+    }
+    if (r.worlds == 0) continue;
     const common::Share share = common::wilson_interval(r.executed, r.worlds);
-    text += fmt::format(
-        "{:<11}{:>7}  {:<22}{:<8}{:<20}{:<24}{:<16}{}\n", r.name, r.objects,
-        r.ratios.empty()
-            ? ""
-            : fmt::format("{:.2f} ({:.2f} .. {:.2f})", common::median(r.ratios), interval.low, interval.high),
-        rank ? fmt::format("{:.2f}", *rank) : "",
-        r.pose_errors.empty() ? ""
-                              : fmt::format("{:.2f}, 90 % {:.1f}", 1e3 * common::median(r.pose_errors),
-                                            1e3 * common::quantile(r.pose_errors, 0.9)),
-        r.worlds ? fmt::format("{}/{} ({:.2f} .. {:.2f})", r.executed, r.worlds, share.low, share.high) : "",
-        time ? fmt::format("{:.2f} x faster", *time) : "",
-        r.worlds ? fmt::format("{:<8}{}/{}", r.denials, r.same_plans, r.worlds) : "");
+    const double time = common::median(r.time_ratios);
+    success.push_back({r.name, std::to_string(r.objects), fmt::format("{}/{}", r.executed, r.worlds),
+                       common::interval_text(share.low, share.high),
+                       std::isfinite(time) ? fmt::format("{:.2f} x faster", time) : "-", std::to_string(r.denials),
+                       fmt::format("{}/{}", r.same_plans, r.worlds)});
+  }
+  std::string text;
+  if (speed.size() > 1) {
+    text +=
+        common::table(speed) +
+        "Ratios are to the first lever. Rank: correlation of costs with full physics. Pose error: where objects end\n"
+        "that full physics moved.\n";
+  }
+  if (success.size() > 1) {
+    text +=
+        (text.empty() ? "" : "\n") + common::table(success) +
+        "Grasps: plans that work with full physics. Denied: successes that it did not confirm. Time to plan: median\n"
+        "over the worlds in which both planned, against the first lever.\n";
   }
   for (const LeverResult& r : results.levers) {
     const std::vector<double> seconds = demo_seconds(results, r.name);
     if (r.objects == results.levers.front().objects && !seconds.empty()) {
-      text += fmt::format("demo, {:<10} median {:.2f} s of {} seeds, {:.2f} s with seed 1\n", r.name,
-                          common::median(seconds), seconds.size(), seconds.front());
+      const auto planned = std::ranges::count_if(
+          results.demo, [&](const DemoPlan& plan) { return plan.lever == r.name && plan.planned; });
+      text += fmt::format("demo, {:<10} median {:.2f} s of {} seeds, {} of which found a plan; {:.2f} s with seed 1\n",
+                          r.name, common::median(seconds), seconds.size(), planned, seconds.front());
     }
   }
   return text;
@@ -408,24 +462,23 @@ nlohmann::json to_json(const CheapPhysics& results) {
   nlohmann::json json{{"levers", nlohmann::json::array()}, {"demo", nlohmann::json::array()}};
   for (const LeverResult& r : results.levers) {
     const common::Share share = common::wilson_interval(r.executed, r.worlds);
-    const common::Interval interval = r.ratios.empty() ? common::Interval{} : common::median_interval(r.ratios);
+    const common::Interval interval = common::median_interval(r.ratios);
     json["levers"].push_back(
         {{"name", r.name},
          {"objects", r.objects},
-         {"candidates_ratio", number_or_null(median_or_none(r.ratios))},
-         {"candidates_ratio_interval", {interval.low, interval.high}},
+         {"candidates_ratio", number_or_null(common::median(r.ratios))},
+         {"candidates_ratio_interval", {number_or_null(interval.low), number_or_null(interval.high)}},
          {"candidates_ratios", r.ratios},
-         {"rank_correlation", number_or_null(median_or_none(r.correlations))},
-         {"pose_error_median", number_or_null(median_or_none(r.pose_errors))},
-         {"pose_error_90",
-          r.pose_errors.empty() ? nlohmann::json() : nlohmann::json(common::quantile(r.pose_errors, 0.9))},
+         {"rank_correlation", number_or_null(common::median(r.correlations))},
+         {"pose_error_median", number_or_null(common::median(r.pose_errors))},
+         {"pose_error_90", number_or_null(common::quantile(r.pose_errors, 0.9))},
          {"poses", r.pose_errors.size()},
          {"success_rate", r.worlds ? nlohmann::json(double(r.executed) / r.worlds) : nlohmann::json()},
-         {"success_interval", {share.low, share.high}},
+         {"success_interval", {number_or_null(share.low), number_or_null(share.high)}},
          {"planned", r.planned},
          {"executed", r.executed},
          {"worlds", r.worlds},
-         {"plan_time_ratio", number_or_null(median_or_none(r.time_ratios))},
+         {"plan_time_ratio", number_or_null(common::median(r.time_ratios))},
          {"plan_time_ratios", r.time_ratios},
          {"denials", r.denials},
          {"same_plans", r.same_plans}});
@@ -439,6 +492,7 @@ nlohmann::json to_json(const CheapPhysics& results) {
 
 namespace {
 
+// After a stop request it has the curves that were finished.
 Result<std::vector<Curve>> compare_peers(Pool& pool, const PbstoOptions& shipped, const CheapPhysicsOptions& options,
                                          std::stop_token stop) {
   std::vector<Scene> scenes;
@@ -455,10 +509,20 @@ Result<std::vector<Curve>> compare_peers(Pool& pool, const PbstoOptions& shipped
                                        .step_duration = shipped.step_duration,
                                        .fidelity = last_choice(shipped),
                                        .objective = options.objective};
-  const auto tell = [&](const Curve& curve, std::size_t done, std::size_t total) {
-    if (options.on_news) options.on_news(fmt::format("peers {}/{}: {} in {}", done, total, curve.method, curve.world));
+  const auto work = [&](std::size_t objects) { return kPeerWork * work_of(static_cast<int>(objects)); };
+  for (const Scene& scene : scenes) {
+    if (options.line) options.line->expect(convergence.contenders.size(), work(scene.objects.size()));
+  }
+  std::vector<Curve> finished;
+  const auto keep = [&](const Curve& curve, std::size_t, std::size_t) {
+    const auto scene = std::ranges::find(scenes, curve.world, &Scene::name);
+    finished.push_back(curve);
+    if (options.line)
+      options.line->step(fmt::format("{} in {}", curve.method, curve.world), work(scene->objects.size()));
   };
-  return measure_convergence(pool, scenes, convergence, tell, std::move(stop));
+  auto curves_result = measure_convergence(pool, scenes, convergence, keep, stop);
+  if (!curves_result && !stop.stop_requested()) return curves_result.error();
+  return finished;
 }
 
 }  // namespace
@@ -477,16 +541,24 @@ Result<void> bench_cheap_physics(CheapPhysicsOptions options, const CheapPhysics
   physics_pool::ThreadPool pool(static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u)));
   auto results = measure_cheap_physics(pool, options, stop);
   if (!results) return results.error();
-  fmt::print("{}", to_text(*results));
+  const bool wants_peers = results->complete && std::ranges::find(options.parts, "peers") != options.parts.end();
   nlohmann::json json = to_json(*results);
   const auto save = [&] { return files.json.empty() ? Result<void>{} : common::write_results(files.json, json); };
-  if (auto ok = save(); !ok) return ok;  // before the peers: half of an hour is worth keeping
-  if (std::ranges::find(options.parts, "peers") == options.parts.end()) return {};
-  auto curves_result = compare_peers(pool, shipped, options, stop);
-  if (!curves_result) return curves_result.error();
-  json["peers"] = to_json(*curves_result)["curves"];
+  if (wants_peers) {
+    if (auto ok = save(); !ok) return ok;  // before the peers: half of an hour is worth keeping
+    auto curves_result = compare_peers(pool, shipped, options, stop);
+    if (!curves_result) return curves_result.error();
+    json["peers"] = to_json(*curves_result)["curves"];
+    if (!files.plot.empty() && !curves_result->empty()) {
+      if (auto ok = plot_convergence(*curves_result, files.plot); !ok) return ok;
+    }
+  }
+  if (options.line) options.line->end();
+  if (stop.stop_requested()) fmt::print("Partial: interrupted.\n");
+  fmt::print("{}", to_text(*results));
+  if (stop.stop_requested()) json["partial"] = true;
   if (auto ok = save(); !ok) return ok;
-  return files.plot.empty() ? Result<void>{} : plot_convergence(*curves_result, files.plot);
+  return stop.stop_requested() ? Result<void>(Error{Code::kCancelled, "interrupted"}) : Result<void>();
 }
 
 }  // namespace jostle::studies

@@ -3,7 +3,6 @@
 /// What each lever that makes physics cheaper gains, and what it costs in truth.
 
 #include <filesystem>
-#include <functional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "planners/pbsto/pbsto.hpp"
 #include "services/common/charts/statistics.hpp"
 #include "services/studies/bench/convergence.hpp"
+#include "services/studies/progress/work_line.hpp"
 
 namespace jostle::studies {
 
@@ -44,8 +44,8 @@ struct CheapPhysicsOptions {
   int large_iterations = 12;              ///< iterations of plans in worlds of more objects, which take minutes
   std::vector<physics_pool::Scene> demo;  ///< scenes that are planned only, with each of demo_seeds
   int demo_seeds = 5;
-  std::uint64_t peer_rollouts = 150;                ///< budget of each peer in each world
-  std::function<void(const std::string&)> on_news;  ///< a line now and then
+  std::uint64_t peer_rollouts = 150;  ///< budget of each peer in each world
+  WorkLine* line = nullptr;           ///< where it is shown how far the work has come; null: nowhere
 };
 
 /// One lever in worlds of one size. Ratios are to the first lever.
@@ -72,13 +72,14 @@ struct DemoPlan {
 struct CheapPhysics {
   std::vector<LeverResult> levers;
   std::vector<DemoPlan> demo;
+  bool complete = true;  ///< no stop was requested
 };
 
 /// Levers take turns in every world, so that what disturbs the machine for a while
 /// disturbs all. Plans are executed open loop in the full world, undisturbed: what
 /// full physics has predicted is what happens, so `executed` falls behind `planned`
-/// only if a plan was believed that full physics never saw.
-/// Errors   kCancelled, those of the pool and of Planner::plan
+/// only if a plan was believed that full physics never saw. After a stop request it returns what was measured until
+/// then. Errors   those of the pool and of Planner::plan
 Result<CheapPhysics> measure_cheap_physics(physics_pool::Pool& pool, const CheapPhysicsOptions& options,
                                            std::stop_token stop);
 
@@ -89,7 +90,9 @@ double rank_correlation(const std::vector<double>& a, const std::vector<double>&
 std::string to_text(const CheapPhysics& results);
 nlohmann::json to_json(const CheapPhysics& results);
 
-/// `jostle bench cheap-physics`: measures, prints, writes. Files may be empty.
+/// `jostle bench cheap-physics`: measures, prints, writes. Files may be empty. After a stop request it prints and
+/// writes what was measured until then. Error kCancelled after that; else those of measure_cheap_physics and of the
+/// files
 struct CheapPhysicsFiles {
   std::filesystem::path json, plot;
 };

@@ -83,7 +83,8 @@ Result<Sample> time_plan(const Planning& planning, bool stop_losers, std::uint64
 
 }  // namespace
 
-Result<Measurements> measure_early_stop(const Settings& settings) {
+Result<void> measure_early_stop(const Settings& settings) {
+  settings.announce(1);
   auto scene_result = clutter(15);
   if (!scene_result) return scene_result.error();
   physics_pool::ThreadPool pool(static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u)));
@@ -93,14 +94,15 @@ Result<Measurements> measure_early_stop(const Settings& settings) {
   planning.first.law.sigma[0] = planning.first.law.sigma[1] = 0.09;
 
   std::uint64_t steps_stopping = 0, steps_patient = 0;
-  auto result = compare({"losers stopped", [&] { return time_plan(planning, true, steps_stopping); }},
-                        {"all to the end", [&] { return time_plan(planning, false, steps_patient); }},
-                        {.repeats = settings.repeats, .stop = settings.stop});
+  auto result =
+      compare({"losers stopped", [&] { return time_plan(planning, true, steps_stopping); }},
+              {"all to the end", [&] { return time_plan(planning, false, steps_patient); }}, settings.turns());
   if (!result) return result.error();
   result->name = "early-stop";
   result->unit = "rollouts/s";
   result->details = {{"steps_saved", 1.0 - static_cast<double>(steps_stopping) / static_cast<double>(steps_patient)}};
-  return Measurements{*std::move(result)};
+  settings.keep(*std::move(result));
+  return {};
 }
 
 }  // namespace jostle::studies

@@ -4,9 +4,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
+#include <functional>
+#include <memory>
 #include <optional>
 
+#include "services/common/charts/gnuplot.hpp"
 #include "services/common/process/cores.hpp"
 #include "services/common/process/domain_claim.hpp"
 #include "services/common/process/files.hpp"
@@ -21,117 +23,365 @@
 namespace jostle::studies {
 namespace {
 
-struct Benchmark {
-  const char* name;
-  const char* purpose;
-  int repeats;  // unless the user says
-  Result<Measurements> (*measure)(const Settings&);
+constexpr const char* kSpeaker = "jostle bench";
+
+int fail(const Error& error) {
+  if (error.code == Code::kCancelled) {
+    fmt::print(stderr, "{}: interrupted\n", kSpeaker);
+    return common::kExitInterrupted;
+  }
+  fmt::print(stderr, "{}: {}\n", kSpeaker, error.message);
+  return error.code == Code::kInvalidArgument ? common::kExitUsage : common::kExitBroken;
+}
+
+Result<int> exit_code(const Result<void>& ok) {
+  if (!ok) return ok.error();
+  return int{common::kExitOk};
+}
+
+/// What a benchmark is started with.
+struct Start {
+  int domain = 0;
+  std::stop_token stop;
+  WorkLine* line = nullptr;  ///< never null
 };
 
-constexpr auto kBenchmarks = std::to_array<Benchmark>({
-    {"bag", "messages into a bag against bare appends of the same bytes", 7, measure_bag},
-    {"play", "a bag as a subscriber hears it against the bag, at rates from 0.1 to 10", 3, measure_play},
-    {"pool-threads", "ThreadPool against bare loops of engine steps", 15, measure_pool_threads},
-    {"pool-dds", "two worker processes against two bare loops", 15, measure_pool_dds},
-    {"round-trip", "an empty assignment through the pool against a bare Fast DDS echo", 25, measure_round_trip},
-    {"early-stop", "a batch that stops its losers against one that does not", 5, measure_early_stop},
-    {"scheduling", "waiting workers against workers that never idle", 5, measure_scheduling},
-    {"coarse-models", "coarse models against the fine one, per control step", 9, measure_coarse_models},
-    {"parareal", "Parareal on all processors against what Eq. 6.4 allows", 15, measure_parareal},
-    {"parareal-scheduling", "Parareal on 4 to 32 waiting workers against Eq. 6.4", 9, measure_parareal_scheduling},
-    {"hosts", "between two hosts: round trip and throughput, protected against unprotected", 9, measure_hosts},
-    {"hosts-scheduling", "waiting workers on several hosts against workers that never idle", 5,
-     measure_hosts_scheduling},
-    {"unplugged", "work one of whose two hosts is unplugged for a while against work left alone", 5, measure_unplugged},
-});
+/// A benchmark, its options and its results.
+class Benchmark {
+ public:
+  enum class Uses { kNothing, kDomain };
 
-constexpr const char* kChaos = "chaos";
-constexpr const char* kCheapPhysics = "cheap-physics";
-constexpr const char* kPool = "pool";
-constexpr const char* kRecord = "record";
+  Benchmark(std::string name, std::string purpose, std::string takes, Uses uses)
+      : name(std::move(name)), purpose(std::move(purpose)), takes(std::move(takes)), uses(uses) {}
+  virtual ~Benchmark() = default;
 
-int list() {
-  fmt::print("{:<20} {}\n", kChaos,
-             "plans while workers are killed, stalled and unplugged: all bit-equal, and how slow");
-  fmt::print("{:<20} {}\n", kCheapPhysics,
-             "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers");
-  fmt::print("{:<20} {}\n", kPool, "what each worker did when: busy shares, gaps, a picture");
-  fmt::print("{:<20} {}\n", kRecord, "the recorder at 20,000 messages per second, or what it costs a plan");
-  for (const Benchmark& benchmark : kBenchmarks) fmt::print("{:<20} {}\n", benchmark.name, benchmark.purpose);
+  virtual void add_options(CLI::App& app) = 0;
+
+  /// What can be told before the work begins. Error kInvalidArgument, kIo
+  virtual Result<void> check() const { return check_output(json); }
+
+  /// Returns an exit code.
+  virtual Result<int> run(const Start& start) = 0;
+
+  virtual const char* unit() const { return "runs"; }  ///< what is counted while it runs
+
+  const std::string name, purpose;
+  const std::string takes;  ///< with its defaults, on two cores; empty: it is no benchmark that a user starts
+  const Uses uses;
+
+ protected:
+  void add_json(CLI::App& app) { app.add_option("--json", json, "File for all numbers"); }
+
+  static Result<void> check_output(const std::string& file) { return common::check_outputs({{"--json", file, {}}}); }
+  static Result<void> check_picture(const std::string& file) {
+    if (file.empty()) return {};
+    if (auto ok = common::check_picture(file); !ok) return ok;
+    return common::check_outputs({{"--plot", file, {}}});
+  }
+
+  std::string json;
+};
+
+/// Two sides in turns, as most of them are.
+class Ratio : public Benchmark {
+ public:
+  using Measure = Result<void> (*)(const Settings&);
+
+  Ratio(std::string name, std::string purpose, std::string takes, Uses uses, int repeats, Measure measure)
+      : Benchmark(std::move(name), std::move(purpose), std::move(takes), uses), measure_(measure) {
+    settings_.repeats = repeats;
+  }
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--repeats", settings_.repeats, "Runs of each side, after one that is not counted")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    Measurements done;
+    settings_.domain = start.domain;
+    settings_.stop = start.stop;
+    settings_.line = start.line;
+    settings_.done = &done;
+    const auto measured = measure_(settings_);
+    start.line->end();
+    for (const Measurement& measurement : done) fmt::print("{}", to_text(measurement));
+    const bool complete = measured && !start.stop.stop_requested();
+    if (!json.empty() && (complete || !done.empty())) {
+      nlohmann::json results{{"results", to_json(done)}};
+      if (!complete) results["partial"] = true;
+      if (auto ok = common::write_results(json, std::move(results)); !ok) return ok.error();
+    }
+    if (start.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
+    if (!measured) return measured.error();
+    return int{std::ranges::all_of(done, &Measurement::agrees) ? common::kExitOk : common::kExitFailed};
+  }
+
+ protected:
+  Settings settings_;
+
+ private:
+  const Measure measure_;
+};
+
+/// The same for several numbers of workers.
+class RatioOfWorkers final : public Ratio {
+ public:
+  using Ratio::Ratio;
+
+  void add_options(CLI::App& app) override {
+    settings_.workers = {64};
+    app.add_option("--workers", settings_.workers, "Worker processes, such as 8,16,64: one measurement each")
+        ->capture_default_str()
+        ->delimiter(',')
+        ->check(CLI::Range(1, 1024));
+    Ratio::add_options(app);
+  }
+};
+
+class Chaos final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--seed", options_.seed, "Seed of the schedule of faults")->capture_default_str();
+    app.add_option("--faults", options_.faults, "How many faults; three or so a second")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1'000'000));
+    app.add_option("--workers", options_.workers, "Worker processes")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.json = json;
+    options_.domain = start.domain;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    const auto equal_result = bench_chaos(options_);
+    if (!equal_result) return equal_result.error();
+    return int{*equal_result ? common::kExitOk : common::kExitFailed};
+  }
+
+  const char* unit() const override { return "faults"; }
+
+ private:
+  ChaosOptions options_;
+};
+
+class CheapPhysicsBenchmark final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--parts", options_.parts, "What to measure")
+        ->capture_default_str()
+        ->delimiter(',')
+        ->check(CLI::IsMember(options_.parts));
+    app.add_option("--repeats", options_.repeats, "Measurements of speed in each world")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    app.add_option("--worlds", options_.executed_worlds, "Worlds of 15 objects that are planned and executed")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1000));
+    add_json(app);
+    app.add_option("--plot", plot_, "File for a figure of cost against rollouts and time: .png, .svg or .pdf");
+  }
+
+  Result<void> check() const override {
+    if (auto ok = check_picture(plot_); !ok) return ok;
+    return Benchmark::check();
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.line = start.line;
+    return exit_code(bench_cheap_physics(options_, {.json = json, .plot = plot_},
+                                         common::data_file("experiments/grasping.yaml"), start.stop));
+  }
+
+ private:
+  CheapPhysicsOptions options_;
+  std::string plot_;
+};
+
+class PoolTimeline final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    options_.workers = common::usable_cores();
+    app.add_option("--workers", options_.workers, "Worker processes (default: one per core that this process may use)")
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--clients", options_.clients, "Clients at once, each with shorter samples than the one before")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 8));
+    app.add_option("--repeats", options_.batches, "Batches of each client")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    app.add_flag("--urgent", options_.urgent, "The last client's batches are urgent");
+    app.add_flag("--pin", pin_, "Give each worker a core of its own, in turn");
+    app.add_option("--timeline", timeline_, "File for a picture of what each worker did when: .png, .svg or .pdf");
+    add_json(app);
+  }
+
+  Result<void> check() const override {
+    if (auto ok = check_picture(timeline_); !ok) return ok;
+    return Benchmark::check();
+  }
+
+  Result<int> run(const Start& start) override {
+    if (pin_) options_.cores = common::allowed_cores();
+    options_.picture = timeline_;
+    options_.json = json;
+    options_.domain = start.domain;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_pool(options_));
+  }
+
+ private:
+  PoolTimelineOptions options_;
+  std::string timeline_;
+  bool pin_ = false;
+};
+
+class Record : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    add_pace(app);
+    auto* disturbance =
+        app.add_flag("--disturbance", disturbance_, "Measure the time of a plan with and without a recorder instead");
+    app.add_option("--repeats", pairs_, "Pairs of plans of --disturbance")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000))
+        ->needs(disturbance);
+  }
+
+  Result<int> run(const Start& start) override { return exit_code(bench_record(options_for(start))); }
+
+  const char* unit() const override { return disturbance_ ? "plans" : "s"; }
+
+ protected:
+  void add_pace(CLI::App& app) {
+    app.add_option("--rate", options_.rate, "Messages of 1 KiB per second")
+        ->capture_default_str()
+        ->check(CLI::Range(1.0, 1e6));
+    app.add_option("--seconds", options_.seconds, "How long")->capture_default_str()->check(CLI::Range(0.1, 86400.0));
+    add_json(app);
+  }
+  RecordBenchOptions options_for(const Start& start) const {
+    RecordBenchOptions options = options_;
+    if (disturbance_) options.pairs = pairs_;
+    options.json = json;
+    options.domain = start.domain;
+    options.stop = start.stop;
+    options.line = start.line;
+    return options;
+  }
+
+ private:
+  RecordBenchOptions options_;
+  bool disturbance_ = false;
+  int pairs_ = 9;
+};
+
+/// The other process of `record`.
+class Publisher final : public Record {
+ public:
+  using Record::Record;
+  void add_options(CLI::App& app) override { add_pace(app); }
+  Result<void> check() const override { return {}; }
+  Result<int> run(const Start& start) override { return publish_for_record(options_for(start)); }
+};
+
+/// The other process of `round-trip`.
+class EchoServer final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+  void add_options(CLI::App&) override {}
+  Result<int> run(const Start& start) override { return serve_echo(start.domain, start.stop); }
+};
+
+std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
+  constexpr auto kNothing = Benchmark::Uses::kNothing, kDomain = Benchmark::Uses::kDomain;
+  std::vector<std::unique_ptr<Benchmark>> all;
+  const auto add = [&]<class Kind, class... T>(std::type_identity<Kind>, const char* name, const char* purpose,
+                                               const char* takes, T... more) {
+    all.push_back(std::make_unique<Kind>(name, purpose, takes, more...));
+  };
+  constexpr std::type_identity<Ratio> ratio;
+  constexpr std::type_identity<RatioOfWorkers> of_workers;
+  add(ratio, "bag", "messages into a bag against bare appends of the same bytes", "15 s", kNothing, 7, measure_bag);
+  add(std::type_identity<Chaos>(), "chaos",
+      "plans while workers are killed, stalled and unplugged: all bit-equal, and how slow", "2 min", kDomain);
+  add(std::type_identity<CheapPhysicsBenchmark>(), "cheap-physics",
+      "freezing, screening, pruning: candidates per second, truth, success; and PBSTO's peers", "an hour", kNothing);
+  add(ratio, "coarse-models", "coarse models against the fine one, per control step", "15 s", kNothing, 9,
+      measure_coarse_models);
+  add(ratio, "early-stop", "a batch that stops its losers against one that does not", "2 min", kNothing, 5,
+      measure_early_stop);
+  add(ratio, "hosts", "between two hosts: round trip and throughput, protected against unprotected", "5 min", kDomain,
+      9, measure_hosts);
+  add(of_workers, "hosts-scheduling", "waiting workers on several hosts against workers that never idle", "1 min",
+      kDomain, 5, measure_hosts_scheduling);
+  add(ratio, "parareal", "Parareal on all processors against what Eq. 6.4 allows", "15 s", kNothing, 15,
+      measure_parareal);
+  add(ratio, "parareal-scheduling", "Parareal on 4 to 32 waiting workers against Eq. 6.4", "1 min", kDomain, 9,
+      measure_parareal_scheduling);
+  add(ratio, "play", "a bag as a subscriber hears it against the bag, at rates from 0.1 to 10", "5 min", kDomain, 3,
+      measure_play);
+  add(std::type_identity<PoolTimeline>(), "pool", "what each worker did when: busy shares, gaps, a picture", "10 s",
+      kDomain);
+  add(ratio, "pool-dds", "two worker processes against two bare loops", "15 s", kDomain, 15, measure_pool_dds);
+  add(ratio, "pool-threads", "ThreadPool against bare loops of engine steps", "15 s", kNothing, 15,
+      measure_pool_threads);
+  add(std::type_identity<Record>(), "record", "the recorder at 20,000 messages per second, or what it costs a plan",
+      "75 s", kDomain);
+  add(ratio, "round-trip", "an empty assignment through the pool against a bare Fast DDS echo", "2 s", kDomain, 25,
+      measure_round_trip);
+  add(of_workers, "scheduling", "waiting workers against workers that never idle", "30 s", kDomain, 5,
+      measure_scheduling);
+  add(ratio, "unplugged", "work one of whose two hosts is unplugged for a while against work left alone", "7 min",
+      kDomain, 5, measure_unplugged);
+  add(std::type_identity<EchoServer>(), "echo", "", "", kDomain);
+  add(std::type_identity<Publisher>(), "publish", "", "", kDomain);
+  return all;
+}
+
+int list(const std::vector<std::unique_ptr<Benchmark>>& benchmarks) {
+  for (const auto& benchmark : benchmarks) {
+    if (!benchmark->takes.empty())
+      fmt::print("{:<20} {} (about {})\n", benchmark->name, benchmark->purpose, benchmark->takes);
+  }
   return common::kExitOk;
 }
 
-int fail(const Error& error, int code) {
-  fmt::print(stderr, "jostle bench: {}\n", error.message);
-  return error.code == Code::kCancelled ? common::kExitInterrupted : code;
-}
-
-int perform(const Benchmark& benchmark, Settings settings, const std::string& json) {
-  if (settings.repeats == 0) settings.repeats = benchmark.repeats;
-  auto result = benchmark.measure(settings);
-  if (!result) return fail(result.error(), common::kExitBroken);
-  for (const Measurement& measurement : *result) fmt::print("{}", to_text(measurement));
-  if (!json.empty()) {
-    if (auto ok = common::write_results(json, to_json(*result)); !ok) return fail(ok.error(), common::kExitBroken);
+int run(Benchmark& benchmark, std::optional<int> domain) {
+  if (auto ok = benchmark.check(); !ok) return fail({Code::kInvalidArgument, ok.error().message});
+  // Neither a user's system nor another benchmark is in the way.
+  std::optional<common::OwnDomain> own;
+  if (!domain && benchmark.uses == Benchmark::Uses::kDomain) {
+    auto own_result = common::claim_some_domain();
+    if (!own_result) return fail(own_result.error());
+    own = std::move(own_result).value();
+    domain = own->domain;
   }
-  const bool agree = std::ranges::all_of(*result, &Measurement::agrees);
-  return agree ? common::kExitOk : common::kExitFailed;
-}
-
-int compare_levers(const Settings& settings, const std::string& json, const std::string& plot, int worlds,
-                   const std::vector<std::string>& parts) {
-  CheapPhysicsOptions options{.parts = parts, .executed_worlds = worlds, .on_news = [](const std::string& line) {
-                                fmt::print(stderr, "{}\n", line);
-                              }};
-  if (settings.repeats > 0) options.repeats = settings.repeats;
-  const auto ok = bench_cheap_physics(options, {.json = json, .plot = plot},
-                                      common::data_file("experiments/grasping.yaml"), settings.stop);
-  return ok ? common::kExitOk : fail(ok.error(), common::kExitBroken);
-}
-
-std::optional<Error> not_one_number(const std::vector<int>& workers) {
-  if (workers.size() < 2) return {};
-  return Error{Code::kInvalidArgument, fmt::format("--workers: got {} numbers, wanted one", workers.size())};
-}
-
-int disturb(const Settings& settings, ChaosOptions options) {
-  if (const auto problem = not_one_number(settings.workers)) return fail(*problem, common::kExitUsage);
-  if (!settings.workers.empty()) options.workers = settings.workers.front();
-  options.domain = settings.domain;
-  options.on_news = settings.on_news;
-  options.stop = settings.stop;
-  const auto equal_result = bench_chaos(options);
-  if (!equal_result) return fail(equal_result.error(), common::kExitBroken);
-  return *equal_result ? common::kExitOk : common::kExitFailed;
-}
-
-int show_pool(const Settings& settings, PoolTimelineOptions options) {
-  if (const auto problem = not_one_number(settings.workers)) return fail(*problem, common::kExitUsage);
-  options.workers = settings.workers.empty() ? common::usable_cores() : settings.workers.front();
-  if (settings.repeats > 0) options.batches = settings.repeats;
-  options.domain = settings.domain;
-  options.stop = settings.stop;
-  const auto ok = bench_pool(options);
-  return ok ? common::kExitOk
-            : fail(ok.error(), ok.error().code == Code::kInvalidArgument ? common::kExitUsage : common::kExitBroken);
-}
-
-int record(const Settings& settings, RecordBenchOptions options, bool disturbance) {
-  if (disturbance) options.pairs = settings.repeats > 0 ? settings.repeats : 9;
-  const auto ok = bench_record(options);
-  return ok ? common::kExitOk : fail(ok.error(), common::kExitBroken);
-}
-
-int start(const std::string& name, const Settings& settings, const std::string& json) {
-  if (name == "list") return list();
-  if (name == "echo") return serve_echo(settings.domain, settings.stop);
-  const auto benchmark = std::ranges::find(kBenchmarks, name, [](const Benchmark& b) { return std::string(b.name); });
-  if (benchmark == kBenchmarks.end()) {
-    return fail(
-        {Code::kInvalidArgument, fmt::format("name: got '{}', wanted one that `jostle bench list` shows", name)},
-        common::kExitUsage);
+  const common::StopSignal signal;
+  WorkLine line(fmt::format("{} {}", kSpeaker, benchmark.name), benchmark.unit());
+  try {
+    const auto code_result = benchmark.run({.domain = domain.value_or(0), .stop = signal.token(), .line = &line});
+    line.end();
+    return code_result ? *code_result : fail(code_result.error());
+  } catch (const std::exception& error) {  // the middleware's SetupError, the engine's errors
+    line.end();
+    fmt::print(stderr, "{}: {}\n", kSpeaker, error.what());
+    return common::kExitBroken;
   }
-  return perform(*benchmark, settings, json);
 }
 
 }  // namespace
@@ -140,104 +390,38 @@ int start(const std::string& name, const Settings& settings, const std::string& 
 int main(int argc, char** argv) {
   using namespace jostle;
   using namespace jostle::studies;
-  CLI::App app("Measures the ratio of two ways to do the same work, in turns, on this machine.", "jostle bench");
-  std::string name, json, plot;
-  int worlds = CheapPhysicsOptions{}.executed_worlds;
-  std::vector<std::string> parts = CheapPhysicsOptions{}.parts;
-  Settings settings{.on_news = [](const std::string& line) { fmt::print(stderr, "{}\n", line); }};
-  app.add_option("name", name, "A benchmark, or `list`")->required();
-  app.add_option("--repeats", settings.repeats, "Runs of each side, batches of pool (default: the benchmark's)")
-      ->check(CLI::Range(1, 100'000));
-  app.add_option("--json", json, "File for all numbers");
-  app.add_option("--plot", plot, "Of cheap-physics: PNG of cost against rollouts and against time");
-  app.add_option("--parts", parts, "Of cheap-physics: what to measure")
-      ->capture_default_str()
-      ->delimiter(',')
-      ->check(CLI::IsMember(parts));
-  app.add_option("--worlds", worlds, "Of cheap-physics: worlds of 15 objects that are planned and executed")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
-  app.add_option("--workers", settings.workers,
-                 "Of scheduling, hosts-scheduling: worker processes, such as 8,16,64 (default: 64);\n"
-                 "of pool: their number (default: one per core this process may use); of chaos: theirs (default: 4)")
-      ->delimiter(',')
-      ->check(CLI::Range(1, 1024));
-  ChaosOptions chaos;
-  app.add_option("--seed", chaos.seed, "Of chaos: of its schedule")->capture_default_str();
-  app.add_option("--faults", chaos.faults, "Of chaos: how many")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1'000'000));
-  PoolTimelineOptions timeline;
-  bool pin = false;
-  app.add_option("--timeline", timeline.picture, "Of pool: PNG or SVG of what each worker did when");
-  app.add_option("--clients", timeline.clients,
-                 "Of pool: clients at once, each with shorter samples than the one before")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 8));
-  app.add_flag("--urgent", timeline.urgent, "Of pool: the last client's batches are urgent");
-  app.add_flag("--pin", pin, "Of pool: give each worker a core of its own, in turn");
-  RecordBenchOptions recording;
-  bool disturbance = false;
-  app.add_option("--rate", recording.rate, "Of record: messages of 1 KiB per second")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 1e6));
-  app.add_option("--seconds", recording.seconds, "Of record: how long")
-      ->capture_default_str()
-      ->check(CLI::Range(0.1, 86400.0));
-  app.add_flag("--disturbance", disturbance, "Of record: the time of a plan with and without a recorder instead");
-  common::add_network_options(app);
-  auto* domain = app.add_option("--domain", settings.domain, "DDS domain (default: one of its own, 1 to 100)")
-                     ->check(CLI::Range(0, 232));
-  app.footer(
-      "Exit codes: 0 measured, 1 the two sides computed different things, 2 bad arguments,\n"
-      "3 a part of the system failed, 130 interrupted. Slowness is no failure.");
+  CLI::App app(
+      "Measures the ratio of two ways to do the same work, in turns, on this machine. `jostle bench NAME --help`\n"
+      "lists the options of a benchmark.",
+      kSpeaker);
+  app.require_subcommand(0, 1);
+  std::string unknown;
+  std::optional<int> domain;
+  const auto benchmarks = all_benchmarks();
+  for (const auto& benchmark : benchmarks) {
+    const bool is_public = !benchmark->takes.empty();
+    CLI::App* command = app.add_subcommand(
+        benchmark->name, is_public ? fmt::format("{} (about {})", benchmark->purpose, benchmark->takes) : "");
+    if (!is_public) command->group("");
+    benchmark->add_options(*command);
+    if (benchmark->uses == Benchmark::Uses::kDomain) {
+      common::add_network_options(*command);
+      command->add_option("--domain", domain, "DDS domain (default: one of its own, 1 to 100)")
+          ->check(CLI::Range(0, 232));
+    }
+    command->footer(
+        "Exit codes: 0 measured, 1 the two sides computed different things, 2 bad arguments,\n"
+        "3 a part of the system failed, 130 interrupted: what was measured is printed. Slowness is no failure.");
+  }
+  const CLI::App* lists = app.add_subcommand("list", "list the benchmarks, and how long each takes");
+  app.add_option("name", unknown)->group("");  // what is no benchmark ends up here
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
-  // Neither a user's system nor another benchmark is in the way.
-  std::optional<common::OwnDomain> own;
-  if (domain->count() == 0) {
-    auto own_result = common::claim_some_domain();
-    if (!own_result) return fail(own_result.error(), common::kExitBroken);
-    own = std::move(own_result).value();
-    settings.domain = own->domain;
+
+  if (lists->parsed()) return list(benchmarks);
+  for (const auto& benchmark : benchmarks) {
+    if (app.get_subcommand(benchmark->name)->parsed()) return run(*benchmark, domain);
   }
-  const common::StopSignal signal;
-  settings.stop = signal.token();
-  try {
-    if (name == kChaos) {
-      chaos.json = json;
-      return disturb(settings, chaos);
-    }
-    if (app.count("--seed") + app.count("--faults") > 0) {
-      fmt::print(stderr, "jostle bench: --seed, --faults: got '{}', wanted {}\n", name, kChaos);
-      return common::kExitUsage;
-    }
-    if (name == kCheapPhysics) return compare_levers(settings, json, plot, worlds, parts);
-    if (name == kPool) {
-      timeline.json = json;
-      if (pin) timeline.cores = common::allowed_cores();
-      return show_pool(settings, timeline);
-    }
-    recording.json = json;
-    recording.domain = settings.domain;
-    recording.stop = settings.stop;
-    if (name == kRecord) return record(settings, recording, disturbance);
-    if (name == "publish") return publish_for_record(recording);
-    if (app.count("--rate") + app.count("--seconds") + app.count("--disturbance") > 0) {
-      fmt::print(stderr, "jostle bench: --rate, --seconds, --disturbance: got '{}', wanted {}\n", name, kRecord);
-      return common::kExitUsage;
-    }
-    if (app.count("--timeline") + app.count("--clients") + app.count("--urgent") + app.count("--pin") > 0) {
-      fmt::print(stderr, "jostle bench: --timeline, --clients, --urgent, --pin: got '{}', wanted {}\n", name, kPool);
-      return common::kExitUsage;
-    }
-    if (settings.workers.empty()) settings.workers = {64};
-    if (app.count("--plot") + app.count("--worlds") + app.count("--parts") > 0) {
-      fmt::print(stderr, "jostle bench: --plot, --worlds, --parts: got '{}', wanted {}\n", name, kCheapPhysics);
-      return common::kExitUsage;
-    }
-    return start(name, settings, json);
-  } catch (const std::exception& error) {  // the middleware's SetupError, the engine's errors
-    fmt::print(stderr, "jostle bench: {}\n", error.what());
-    return common::kExitBroken;
-  }
+  if (unknown.empty()) unknown = "nothing";
+  fmt::print(stderr, "{}: name: got '{}', wanted one that `jostle bench list` shows\n", kSpeaker, unknown);
+  return common::kExitUsage;
 }

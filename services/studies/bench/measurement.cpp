@@ -5,15 +5,19 @@
 #include <time.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "services/common/results/results.hpp"
 
 namespace jostle::studies {
 namespace {
 
+using common::number_or_null;
+
 double load_average() {
   double load = 0.0;
-  getloadavg(&load, 1);
-  return load;
+  return getloadavg(&load, 1) == 1 ? load : common::kNone;
 }
 
 std::vector<double> ratios(const Measurement& measurement) {
@@ -33,8 +37,10 @@ nlohmann::json to_object(const Measurement& measurement) {
     samples.push_back({measurement.a[i], measurement.b[i]});
   }
   nlohmann::json object{{"name", measurement.name},
-                        {"ratio", measurement.ratio()},
-                        {"interval", {interval.low, interval.high}},
+                        {"ratio", number_or_null(measurement.ratio())},
+                        {"interval", {number_or_null(interval.low), number_or_null(interval.high)}},
+                        {"repeats", measurement.a.size()},
+                        {"repeats_wanted", measurement.wanted},
                         {"samples", samples},
                         {"name_a", measurement.name_a},
                         {"name_b", measurement.name_b},
@@ -46,10 +52,10 @@ nlohmann::json to_object(const Measurement& measurement) {
                         {"hash_a", to_string(measurement.hash_a)},
                         {"hash_b", to_string(measurement.hash_b)},
                         {"agrees", measurement.agrees},
-                        {"load", measurement.load},
+                        {"load", number_or_null(measurement.load)},
                         {"details", nlohmann::json::object()},
                         {"aim", nullptr}};
-  for (const auto& [name, value] : measurement.details) object["details"][name] = value;
+  for (const auto& [name, value] : measurement.details) object["details"][name] = number_or_null(value);
   if (measurement.aim) {
     object["aim"] = to_text(*measurement.aim);
     object["met"] = measurement.aim->met_by(measurement.ratio());
@@ -70,25 +76,36 @@ double own_cpu_seconds() {
 }
 
 Result<Measurement> compare(const Side& a, const Side& b, const Turns& turns) {
-  Measurement measurement{.name_a = a.name, .name_b = b.name, .load = load_average()};
+  Measurement measurement{.name_a = a.name, .name_b = b.name, .wanted = turns.repeats, .load = load_average()};
   for (int i = -1; i < turns.repeats; ++i) {
-    for (const Side* side : {&a, &b}) {
-      if (turns.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
+    Sample samples[2];
+    double cpu[2];
+    for (const int side : {0, 1}) {
       const double cpu_before = turns.cpu_seconds();
-      auto sample_result = side->run();
-      if (!sample_result) return sample_result.error();
-      const bool is_a = side == &a;
-      Hash& hash = is_a ? measurement.hash_a : measurement.hash_b;
-      if (i < 0) {
-        hash = sample_result->hash;
-        continue;
+      // A side that fails because it was asked to stop has not failed.
+      auto sample_result = turns.stop.stop_requested() ? Result<Sample>(Error{Code::kCancelled, "interrupted"})
+                                                       : (side == 0 ? a : b).run();
+      if (!sample_result && turns.stop.stop_requested()) {
+        if (measurement.a.empty()) return Error{Code::kCancelled, "interrupted"};
+        return measurement;
       }
-      if (hash != sample_result->hash) measurement.agrees = false;
-      (is_a ? measurement.a : measurement.b).push_back(sample_result->value);
-      (is_a ? measurement.cpu_a : measurement.cpu_b).push_back(turns.cpu_seconds() - cpu_before);
+      if (!sample_result) return sample_result.error();
+      samples[side] = *sample_result;
+      cpu[side] = turns.cpu_seconds() - cpu_before;
+      turns.on_run();
     }
+    if (i < 0) {
+      measurement.hash_a = samples[0].hash;
+      measurement.hash_b = samples[1].hash;
+      measurement.agrees = measurement.hash_a == measurement.hash_b;
+      continue;
+    }
+    if (samples[0].hash != measurement.hash_a || samples[1].hash != measurement.hash_b) measurement.agrees = false;
+    measurement.a.push_back(samples[0].value);
+    measurement.b.push_back(samples[1].value);
+    measurement.cpu_a.push_back(cpu[0]);
+    measurement.cpu_b.push_back(cpu[1]);
   }
-  if (measurement.hash_a != measurement.hash_b) measurement.agrees = false;
   return measurement;
 }
 
@@ -101,9 +118,14 @@ std::string one_line(const Measurement& measurement) {
 std::string to_text(const Measurement& measurement) {
   const common::Interval interval = measurement.interval();
   const double ratio = measurement.ratio();
-  std::string text = fmt::format("{}: {} against {}\n  ratio {:.3f}  ({:.3f} .. {:.3f}, {} repeats, load {:.1f})",
-                                 measurement.name, measurement.name_a, measurement.name_b, ratio, interval.low,
-                                 interval.high, measurement.a.size(), measurement.load);
+  const bool is_whole = std::ssize(measurement.a) == measurement.wanted;
+  const std::string repeats = is_whole ? fmt::format("{} repeat{}", measurement.wanted, measurement.wanted == 1 ? "" : "s")
+                                       : fmt::format("{} of {} repeats", measurement.a.size(), measurement.wanted);
+  const std::string range =
+      measurement.a.size() > 1 ? fmt::format("{:.3f} .. {:.3f}, ", interval.low, interval.high) : "";
+  std::string text =
+      fmt::format("{}: {} against {}\n  ratio {:.3f}  ({}{}, load {})", measurement.name, measurement.name_a,
+                  measurement.name_b, ratio, range, repeats, common::number_text(measurement.load, 1));
   if (measurement.aim) {
     text += fmt::format("  aim {}: {}", to_text(*measurement.aim), measurement.aim->met_by(ratio) ? "met" : "missed");
   }
@@ -114,7 +136,9 @@ std::string to_text(const Measurement& measurement) {
   };
   side(measurement.name_a, measurement.a, measurement.cpu_a, measurement.hash_a);
   side(measurement.name_b, measurement.b, measurement.cpu_b, measurement.hash_b);
-  for (const auto& [name, value] : measurement.details) text += fmt::format("\n  {:<18} {:>12.5g}", name, value);
+  for (const auto& [name, value] : measurement.details) {
+    text += fmt::format("\n  {:<18} {:>12}", name, std::isfinite(value) ? fmt::format("{:.5g}", value) : "-");
+  }
   if (!measurement.agrees) text += "\n  WRONG: not every run computed the same";
   return text + "\n";
 }

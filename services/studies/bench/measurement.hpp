@@ -46,6 +46,7 @@ struct Measurement {
   std::vector<double> cpu_a, cpu_b;
   Hash hash_a, hash_b;
   bool agrees = true;  ///< every run of both sides computed the same
+  int wanted = 0;      ///< repeats that were asked for; fewer were made if somebody asked to stop
   std::optional<Aim> aim;
   std::vector<std::pair<std::string, double>> details;  ///< further numbers, by name
   double load = 0.0;  ///< one-minute load average before; more than 0.1 is somebody else's
@@ -62,10 +63,14 @@ struct Turns {
   int repeats = 1;
   std::stop_token stop;
   std::function<double()> cpu_seconds = own_cpu_seconds;  ///< CPU time used so far by all processes that take part
+  std::function<void()> on_run = [] {};  ///< called after each run of a side; those that are not counted as well
+
+  int runs() const { return 2 * (repeats + 1); }  ///< that one comparison takes, both sides together
 };
 
-/// Runs a, b, a, b, …, each `repeats` times after one run that is not counted.
-/// Errors   a side's, or kCancelled between two runs.
+/// Runs a, b, a, b, …, each `repeats` times after one run that is not counted. After a stop request the
+/// measurement has the pairs that were complete.
+/// Errors   a side's; kCancelled if no pair was complete
 Result<Measurement> compare(const Side& a, const Side& b, const Turns& turns);
 
 /// Writes one line, for people who wait for the next measurement.
@@ -75,7 +80,7 @@ std::string one_line(const Measurement& measurement);
 std::string to_text(const Measurement& measurement);
 
 /// Writes a list for scripts: objects with name, ratio, interval, samples, a, b,
-/// unit, hash_a, hash_b, aim and more.
+/// unit, hash_a, hash_b, aim and more; null where there is no number.
 nlohmann::json to_json(const std::vector<Measurement>& measurements);
 
 }  // namespace jostle::studies

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <map>
 #include <mutex>
 
@@ -97,8 +98,7 @@ Result<Measurement> measure_coarse(const std::string& model, int sliders, const 
     loop.run(batch);
     return Sample{.value = 1e6 * seconds_since(begin), .hash = question(batch)};
   };
-  auto result = compare({"fine model", time_fine}, {model, time_model},
-                        Turns{.repeats = settings.repeats, .stop = settings.stop});
+  auto result = compare({"fine model", time_fine}, {model, time_model}, settings.turns());
   if (!result) return result.error();
   result->name = fmt::format("coarse-models/{}/{}/{}", model, sliders, integrator);
   result->unit = "us per step of 1 s";
@@ -178,7 +178,7 @@ Result<Measurement> measure_speed_up(int steps, int iterations, const Settings& 
          return Sample{.value = sample_result->value / allowed, .hash = wanted_result->hash};
        }},
       {fmt::format("Parareal, {} threads", threads), [&] { return time_prediction(parareal, batch, settings.stop); }},
-      Turns{.repeats = settings.repeats, .stop = settings.stop});
+      settings.turns());
   if (!result) return result.error();
   result->name = fmt::format("parareal/N={}/K={}", steps, iterations);
   result->unit = "ms";
@@ -259,7 +259,7 @@ Result<Measurement> measure_waiting(int steps, int iterations, const Settings& s
       compare({"Eq. 6.4", [&]() -> Result<Sample> { return Sample{.value = expected, .hash = known_result->hash}; }},
               {fmt::format("Parareal, {} waiting workers", steps),
                [&] { return time_prediction(parareal, batch, settings.stop); }},
-              (*swarm_result)->turns(settings.repeats, settings.stop));
+              (*swarm_result)->turns(settings.turns()));
   if (!result) return result.error();
   result->name = fmt::format("parareal-scheduling/N={}/K={}", steps, iterations);
   result->unit = "ms";
@@ -273,40 +273,43 @@ Result<Measurement> measure_waiting(int steps, int iterations, const Settings& s
 
 }  // namespace
 
-Result<Measurements> measure_coarse_models(const Settings& settings) {
-  Measurements measurements;
-  for (const char* model : {"kinematic", "limit-surface", "planar", "learned"}) {
-    for (const int sliders : {1, 4}) {
-      for (const char* integrator : {"rk4", "euler"}) {
+Result<void> measure_coarse_models(const Settings& settings) {
+  constexpr std::array kModels{"kinematic", "limit-surface", "planar", "learned"};
+  constexpr std::array kSliders{1, 4};
+  constexpr std::array kIntegrators{"rk4", "euler"};
+  settings.announce(static_cast<int>(kModels.size() * kSliders.size() * kIntegrators.size()));
+  for (const char* model : kModels) {
+    for (const int sliders : kSliders) {
+      for (const char* integrator : kIntegrators) {
         auto result = measure_coarse(model, sliders, integrator, settings);
         if (!result) return result.error();
-        measurements.push_back(*std::move(result));
+        settings.keep(*std::move(result));
       }
     }
   }
-  return measurements;
+  return {};
 }
 
-Result<Measurements> measure_parareal(const Settings& settings) {
-  Measurements measurements;
+Result<void> measure_parareal(const Settings& settings) {
+  settings.announce(2);
   for (const int steps : {4, 8}) {
     auto result = measure_speed_up(steps, 1, settings);
     if (!result) return result.error();
-    measurements.push_back(*std::move(result));
+    settings.keep(*std::move(result));
   }
-  return measurements;
+  return {};
 }
 
-Result<Measurements> measure_parareal_scheduling(const Settings& settings) {
-  Measurements measurements;
+Result<void> measure_parareal_scheduling(const Settings& settings) {
+  settings.announce(8);
   for (const int iterations : {1, 2}) {
     for (const int steps : {4, 8, 16, 32}) {
       auto result = measure_waiting(steps, iterations, settings);
       if (!result) return result.error();
-      measurements.push_back(*std::move(result));
+      settings.keep(*std::move(result));
     }
   }
-  return measurements;
+  return {};
 }
 
 }  // namespace jostle::studies

@@ -150,26 +150,26 @@ class PlayBench {
   PlayBench(const Settings& settings, fs::path folder)
       : settings_(settings), folder_(std::move(folder)), messages_(make_messages()) {}
 
-  Result<Measurements> run() {
+  Result<void> run() {
     if (auto ok = write_bag(folder_ / "bag", messages_); !ok) return ok.error();
     auto participant_result = wire::Participant::open({.name = "jostle_bench_play", .domain = settings_.domain});
     if (!participant_result) return participant_result.error();
     subscriber_ = std::make_unique<Subscriber>(*participant_result);
-    Measurements measurements;
     for (const double rate : kRates) {
       auto result = measure(rate);
       if (!result) return result.error();
-      measurements.push_back(*std::move(result));
+      settings_.keep(*std::move(result));
     }
-    return measurements;
+    return {};
   }
 
  private:
   Result<Measurement> measure(double rate) {
     Findings findings;
+    Turns turns = settings_.turns();
+    turns.cpu_seconds = cpu_with_children;
     auto result = compare({"as recorded", [&]() -> Result<Sample> { return as_recorded(rate); }},
-                          {"as played", [&] { return play(rate, findings); }},
-                          {.repeats = settings_.repeats, .stop = settings_.stop, .cpu_seconds = cpu_with_children});
+                          {"as played", [&] { return play(rate, findings); }}, turns);
     if (!result) return result.error();
     result->name = fmt::format("play/{:g}", rate);
     result->unit = "ms";
@@ -279,7 +279,8 @@ class PlayBench {
 
 }  // namespace
 
-Result<Measurements> measure_play(const Settings& settings) {
+Result<void> measure_play(const Settings& settings) {
+  settings.announce(static_cast<int>(std::size(kRates)));
   auto folder_result = common::make_temporary_folder("bench-play");
   if (!folder_result) return folder_result.error();
   auto result = PlayBench(settings, *folder_result).run();

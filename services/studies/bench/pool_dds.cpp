@@ -4,7 +4,8 @@
 
 namespace jostle::studies {
 
-Result<Measurements> measure_pool_dds(const Settings& settings) {
+Result<void> measure_pool_dds(const Settings& settings) {
+  settings.announce(1);
   constexpr int kWorkers = 2;
   auto scene_result = clutter(5);
   if (!scene_result) return scene_result.error();
@@ -19,13 +20,14 @@ Result<Measurements> measure_pool_dds(const Settings& settings) {
 
   auto result = compare({"pool over DDS", [&] { return time_steps(pool, batch, settings.stop); }},
                         {"bare loops", [&]() -> Result<Sample> { return loops.run(batch); }},
-                        (*swarm_result)->turns(settings.repeats, settings.stop));
+                        (*swarm_result)->turns(settings.turns()));
   if (!result) return result.error();
   result->name = "pool-dds";
   result->unit = "steps/s";
   result->aim = Aim{Aim::Kind::kAtLeast, 0.95};
   result->details = {{"workers", kWorkers}};
-  return Measurements{*std::move(result)};
+  settings.keep(*std::move(result));
+  return {};
 }
 
 }  // namespace jostle::studies

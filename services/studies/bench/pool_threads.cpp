@@ -7,7 +7,8 @@
 
 namespace jostle::studies {
 
-Result<Measurements> measure_pool_threads(const Settings& settings) {
+Result<void> measure_pool_threads(const Settings& settings) {
+  settings.announce(1);
   const int threads = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
   auto scene_result = clutter(5);
   if (!scene_result) return scene_result.error();
@@ -19,14 +20,14 @@ Result<Measurements> measure_pool_threads(const Settings& settings) {
   const auto batch = push(*scene_result, 3, 0.5, 16u * static_cast<unsigned>(threads));
 
   auto result = compare({"thread pool", [&] { return time_steps(pool, batch, settings.stop); }},
-                        {"bare loops", [&]() -> Result<Sample> { return loops.run(batch); }},
-                        Turns{.repeats = settings.repeats, .stop = settings.stop});
+                        {"bare loops", [&]() -> Result<Sample> { return loops.run(batch); }}, settings.turns());
   if (!result) return result.error();
   result->name = "pool-threads";
   result->unit = "steps/s";
   result->aim = Aim{Aim::Kind::kAtLeast, 0.98};
   result->details = {{"threads", threads}};
-  return Measurements{*std::move(result)};
+  settings.keep(*std::move(result));
+  return {};
 }
 
 }  // namespace jostle::studies

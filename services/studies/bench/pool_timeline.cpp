@@ -62,20 +62,23 @@ RolloutBatch batch_of(int client, const physics_pool::Scene& scene, int workers)
   return push(scene, steps, kStep, kSamplesPerWorker * static_cast<std::uint32_t>(workers * kLongest / steps));
 }
 
-Result<void> run_batches(pool::RemotePool& pool, const RolloutBatch& batch, int count, std::stop_token stop) {
+Result<void> run_batches(pool::RemotePool& pool, const RolloutBatch& batch, int count,
+                         const PoolTimelineOptions& options) {
   for (int i = 0; i < count; ++i) {
-    auto reply_result = pool.run(batch, std::chrono::steady_clock::now() + kPatience, stop);
+    auto reply_result = pool.run(batch, std::chrono::steady_clock::now() + kPatience, options.stop);
     if (!reply_result) return reply_result.error();
+    options.line->step();
   }
   return {};
 }
 
 // All clients at once.
 Result<void> run_all(const std::vector<pool::RemotePool*>& pools, const std::vector<RolloutBatch>& batches, int count,
-                     std::stop_token stop) {
+                     const PoolTimelineOptions& options) {
   std::vector<std::future<Result<void>>> runs;
   for (std::size_t i = 0; i < pools.size(); ++i) {
-    runs.push_back(std::async(std::launch::async, [&, i] { return run_batches(*pools[i], batches[i], count, stop); }));
+    runs.push_back(
+        std::async(std::launch::async, [&, i] { return run_batches(*pools[i], batches[i], count, options); }));
   }
   Result<void> result;
   for (auto& run : runs) {
@@ -193,6 +196,7 @@ Result<void> bench_pool(const PoolTimelineOptions& options) {
   if (!options.picture.empty()) {
     if (auto ok = common::check_picture(options.picture); !ok) return ok;
   }
+  options.line->expect(static_cast<std::size_t>(options.clients * (options.batches + 1)));
   auto scene_result = clutter(kObjects);
   if (!scene_result) return scene_result.error();
   Recorder recorder;
@@ -225,19 +229,26 @@ Result<void> bench_pool(const PoolTimelineOptions& options) {
     }
   }
   if (options.urgent) batches.back().priority = physics_pool::Priority::kUrgent;
-  if (auto ok = run_all(pools, batches, 1, options.stop); !ok) return ok;  // worlds are compiled, caches warm
+  if (auto ok = run_all(pools, batches, 1, options); !ok) return ok;  // worlds are compiled, caches warm
   const auto start = std::chrono::steady_clock::now();
-  if (auto ok = run_all(pools, batches, options.batches, options.stop); !ok) return ok;
+  const auto ran = run_all(pools, batches, options.batches, options);
+  const auto traces = recorder.since(start);
+  if (!ran && (ran.error().code != Code::kCancelled || traces.empty())) return ran;
 
-  const pool::Timeline timeline = pool::timeline_of(recorder.since(start), pools.front()->status().workers);
+  const pool::Timeline timeline = pool::timeline_of(traces, pools.front()->status().workers);
   const Legend legend = legend_of(timeline, ids, batches);
-  const std::string title = headline(timeline, options);
+  const std::string title = (ran ? "" : "Interrupted: ") + headline(timeline, options);
+  options.line->end();
   print(timeline, title);
   if (!options.picture.empty()) {
     if (auto ok = common::draw(options.picture, chart_of(timeline, legend, title)); !ok) return ok;
   }
-  if (options.json.empty()) return {};
-  return common::write_results(options.json, to_json(timeline, legend, options));
+  if (!options.json.empty()) {
+    nlohmann::json json = to_json(timeline, legend, options);
+    json["interrupted"] = !ran;
+    if (auto ok = common::write_results(options.json, std::move(json)); !ok) return ok;
+  }
+  return ran;
 }
 
 }  // namespace jostle::studies

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "idl/types/result.hpp"
+#include "services/studies/progress/work_line.hpp"
 
 namespace jostle::studies {
 
@@ -18,12 +19,15 @@ struct PoolTimelineOptions {
   bool urgent = false;     ///< whether the last client's batches are urgent
   int batches = 3;         ///< batches of each client, one after the other
   int domain = 0;
-  std::filesystem::path picture;  ///< PNG or SVG; empty: none
+  std::filesystem::path picture;  ///< PNG, SVG or PDF; empty: none
   std::filesystem::path json;     ///< empty: none
   std::stop_token stop;
+  WorkLine* line = nullptr;  ///< where it is shown how far the work has come; never null
 };
 
-/// Runs batches of rollouts on worker processes, prints who was how busy, and draws it.
+/// Runs batches of rollouts on worker processes, prints who was how busy, and draws it. After a stop request it does so
+/// with what has come back until then.
+/// Error kCancelled after that
 Result<void> bench_pool(const PoolTimelineOptions& options);
 
 }  // namespace jostle::studies

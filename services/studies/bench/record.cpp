@@ -8,12 +8,14 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <span>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "services/bags/format/bag_reader.hpp"
@@ -45,7 +47,7 @@ constexpr int kVariants = 1024;                // messages made beforehand, sent
 constexpr std::chrono::milliseconds kBeat{1};  // of the publisher: what is due goes out in a burst
 constexpr std::chrono::seconds kPatience{30};
 constexpr std::chrono::seconds kVisit{1};  // of a recorder beside a plan
-constexpr double kLoopSeconds = 3.0;       // of the loops beside it
+constexpr int kLoopSeconds = 3;            // of the loops beside it
 
 // CDR of joint states whose positions are noise, which does not compress; the stamp has room
 // for a number.
@@ -80,11 +82,11 @@ std::uint64_t number_of(const Bytes& message) {
   return number;
 }
 
-// Durations of many calls, in microseconds.
+// Durations of many calls, in microseconds; null without calls.
 json delays(const std::vector<double>& micros) {
-  return {{"median", common::quantile(micros, 0.5)},
-          {"p99", common::quantile(micros, 0.99)},
-          {"worst", *std::ranges::max_element(micros)}};
+  return {{"median", common::number_or_null(common::quantile(micros, 0.5))},
+          {"p99", common::number_or_null(common::quantile(micros, 0.99))},
+          {"worst", common::number_or_null(common::quantile(micros, 1.0))}};
 }
 
 double micros_since(Clock::time_point begin) { return 1e6 * seconds_since(begin); }
@@ -199,6 +201,11 @@ Result<void> stop_recorder(common::ChildProcess& recorder) {
                fmt::format("the recorder: {}\n{}", ended ? ended->text() : "does not end", recorder.last_words())};
 }
 
+// What is shown of the pace's progress.
+std::size_t seconds_of(const RecordBenchOptions& options) {
+  return static_cast<std::size_t>(std::ceil(options.seconds));
+}
+
 Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) {
   const fs::path bag = folder / "bag", words = folder / "publisher.json";
   auto recorder_result = start_recorder(bag, options.domain);
@@ -211,8 +218,12 @@ Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) 
   if (!publisher_result) return publisher_result.error();
   const auto patience = std::chrono::milliseconds(static_cast<long>(1e3 * options.seconds)) + kPatience;
   const auto begin = Clock::now();
-  while (!publisher_result->wait_for(std::chrono::milliseconds(100))) {
-    if (options.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
+  bool interrupted = false;
+  for (std::size_t shown = 0; !publisher_result->wait_for(std::chrono::milliseconds(100));) {
+    for (; shown < seconds_of(options) && seconds_since(begin) > static_cast<double>(shown + 1); ++shown)
+      options.line->step();
+    // The publisher says what it has sent so far, which counts.
+    if (options.stop.stop_requested() && !std::exchange(interrupted, true)) publisher_result->terminate();
     if (Clock::now() - begin > patience) return Error{Code::kUnavailable, "the publisher does not end"};
   }
   if (const common::ExitStatus ended = *publisher_result->ended(); !ended.ok()) {
@@ -225,7 +236,8 @@ Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) 
   auto back_result = read_back(bag, (*published_result)["sent"]);
   if (!back_result) return back_result.error();
   const json& recorded = *recorded_result;
-  return json{{"publisher", *published_result},
+  return json{{"interrupted", interrupted},
+              {"publisher", *published_result},
               {"recorded", recorded["messages"].value(kTopic, 0)},
               {"lost_by_counters", recorded["lost"].value(kTopic, 0)},
               {"read_back", back_result->messages},
@@ -236,16 +248,21 @@ Result<json> at_pace(const RecordBenchOptions& options, const fs::path& folder) 
               {"delay_us", delays(back_result->delay_us)}};
 }
 
-void print_delays(const char* what, const json& delays) {
-  fmt::print("  {:<44} median {:>8.1f} us   99 % {:>9.1f} us   worst {:>9.1f} us\n", what,
-             delays["median"].get<double>(), delays["p99"].get<double>(), delays["worst"].get<double>());
+std::string number_of(const json& value) {
+  return common::number_text(value.is_null() ? common::kNone : value.get<double>(), 1);
 }
 
-void print(const json& all) {
-  const json &live = all["pace"], &published = live["publisher"];
+void print_delays(const char* what, const json& delays) {
+  fmt::print("  {:<30} median {:>8} us   99 % {:>9} us   worst {:>9} us\n", what, number_of(delays["median"]),
+             number_of(delays["p99"]), number_of(delays["worst"]));
+}
+
+void print_pace(const json& live) {
+  const json& published = live["publisher"];
   const double seconds = published["seconds"];
-  fmt::print("record: {} messages of 1028 bytes in {:.1f} s, {:.0f}/s\n", published["sent"].get<std::uint64_t>(),
-             seconds, published["sent"].get<double>() / seconds);
+  fmt::print("record: {}{} messages of 1028 bytes in {:.1f} s, {:.0f}/s\n",
+             live["interrupted"].get<bool>() ? "interrupted: " : "", published["sent"].get<std::uint64_t>(), seconds,
+             published["sent"].get<double>() / seconds);
   fmt::print("  recorded {}, lost by its counters {}; in the bag {}, missing by their numbers {}\n",
              live["recorded"].get<std::uint64_t>(), live["lost_by_counters"].get<std::uint64_t>(),
              live["read_back"].get<std::uint64_t>(), live["missing_by_numbers"].get<std::uint64_t>());
@@ -253,13 +270,13 @@ void print(const json& all) {
              published["cpu_seconds"].get<double>() / seconds, live["recorder_cpu_seconds"].get<double>() / seconds);
   print_delays("the publisher's write()", published["write_us"]);
   print_delays("from write() to the recorder", live["delay_us"]);
-  fmt::print("  {:<44} {:>53.1f} us\n", "the recorder's worst write to the bag", live["worst_write_us"].get<double>());
-  for (const auto& [name, key] : {std::pair{"bare append loop", "bare_loop"}, std::pair{"bag loop", "bag_loop"},
-                                  std::pair{"bag loop, not compressed", "plain_bag_loop"}}) {
-    fmt::print("  {:<26} {:>9.0f}/s, {:.2f} us of processor time per message\n", name,
-               all[key]["per_second"].get<double>(), all[key]["cpu_us_per_message"].get<double>());
-    print_delays("   append", all[key]["append_us"]);
-  }
+  fmt::print("  {:<58} worst {:>9.1f} us\n", "the recorder's write to the bag", live["worst_write_us"].get<double>());
+}
+
+void print_loop(const char* name, const json& loop) {
+  fmt::print("  {:<26} {:>9.0f}/s, {:.2f} us of processor time per message\n", name, loop["per_second"].get<double>(),
+             loop["cpu_us_per_message"].get<double>());
+  print_delays("   append", loop["append_us"]);
 }
 
 // CPU time of all processes that were started and have ended, and of those that they started.
@@ -284,6 +301,7 @@ Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder,
       folder / "run.log");
   if (!run_result) return run_result.error();
   while (!run_result->ended()) {
+    if (options.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
     if (auto ok = meanwhile(*run_result); !ok) return ok.error();
   }
   const common::ExitStatus ended = *run_result->ended();
@@ -292,6 +310,8 @@ Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder,
   }
   auto report_result = read_json(result);
   if (!report_result) return report_result.error();
+  if (!(*report_result)["plan_seconds"].is_number() || !(*report_result)["plan_hash"].is_string())
+    return Error{Code::kUnavailable, "the run made no plan: " + run_result->last_words()};
   return Sample{.value = (*report_result)["plan_seconds"],
                 .hash = hash_of((*report_result)["plan_hash"].get<std::string>())};
 }
@@ -319,35 +339,57 @@ Result<void> disturbance(const RecordBenchOptions& options, const fs::path& fold
     run.wait_for(kVisit);
     return {};
   };
+  const Turns turns{.repeats = options.pairs, .stop = options.stop, .cpu_seconds = children_cpu_seconds, .on_run = [&] {
+                      options.line->step();
+                    }};
+  options.line->expect(static_cast<std::size_t>(turns.runs()));
   auto result = compare({"plan, recorded", [&] { return plan(options, folder, visit); }},
-                        {"plan alone", [&] { return plan(options, folder, alone); }},
-                        {.repeats = options.pairs, .stop = options.stop, .cpu_seconds = children_cpu_seconds});
+                        {"plan alone", [&] { return plan(options, folder, alone); }}, turns);
   if (!result) return result.error();
   result->name = "record-disturbance";
   result->unit = "s";
+  options.line->end();
   fmt::print("{}", to_text(*result));
-  if (!options.json.empty()) return common::write_text(options.json, to_json({*result}));
+  if (!options.json.empty()) {
+    if (auto ok = common::write_results(options.json, to_json({*result})); !ok) return ok;
+  }
+  return options.stop.stop_requested() ? Result<void>(Error{Code::kCancelled, "interrupted"}) : Result<void>();
+}
+
+// At the pace first, then the loops; `all` has what was finished.
+Result<void> measure_all(const RecordBenchOptions& options, const fs::path& folder, json& all) {
+  const std::pair<const char*, std::function<Result<json>()>> loops[] = {
+      {"bare_loop", [&] { return bare_loop(folder); }},
+      {"bag_loop", [&] { return bag_loop(folder, true); }},
+      {"plain_bag_loop", [&] { return bag_loop(folder, false); }}};
+  options.line->expect(seconds_of(options) + std::size(loops) * kLoopSeconds);
+  auto pace_result = at_pace(options, folder);
+  if (!pace_result) return pace_result.error();
+  all["pace"] = *pace_result;
+  fs::remove_all(folder / "bag");
+  for (const auto& [key, run] : loops) {
+    if (options.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
+    auto loop_result = run();
+    if (!loop_result) return loop_result.error();
+    all[key] = *loop_result;
+    for (int i = 0; i < kLoopSeconds; ++i) options.line->step();
+  }
   return {};
 }
 
 Result<void> measure(const RecordBenchOptions& options, const fs::path& folder) {
   if (options.pairs > 0) return disturbance(options, folder);
   json all;
-  auto pace_result = at_pace(options, folder);
-  if (!pace_result) return pace_result.error();
-  all["pace"] = *pace_result;
-  fs::remove_all(folder / "bag");
-  for (const auto& [key, run] : std::initializer_list<std::pair<const char*, std::function<Result<json>()>>>{
-           {"bare_loop", [&] { return bare_loop(folder); }},
-           {"bag_loop", [&] { return bag_loop(folder, true); }},
-           {"plain_bag_loop", [&] { return bag_loop(folder, false); }}}) {
-    auto loop_result = run();
-    if (!loop_result) return loop_result.error();
-    all[key] = *loop_result;
+  const auto measured = measure_all(options, folder, all);
+  options.line->end();
+  if (all.contains("pace")) print_pace(all["pace"]);
+  for (const auto& [name, key] : {std::pair{"bare append loop", "bare_loop"}, std::pair{"bag loop", "bag_loop"},
+                                  std::pair{"bag loop, not compressed", "plain_bag_loop"}}) {
+    if (all.contains(key)) print_loop(name, all[key]);
   }
-  print(all);
-  if (!options.json.empty()) return common::write_results(options.json, all);
-  return {};
+  if (options.json.empty() || all.empty()) return measured;
+  if (auto ok = common::write_results(options.json, all); !ok) return ok;
+  return measured;
 }
 
 }  // namespace

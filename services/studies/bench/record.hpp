@@ -6,6 +6,7 @@
 #include <stop_token>
 
 #include "idl/types/result.hpp"
+#include "services/studies/progress/work_line.hpp"
 
 namespace jostle::studies {
 
@@ -16,6 +17,7 @@ struct RecordBenchOptions {
   int domain = 0;
   std::filesystem::path json;  ///< empty: none
   std::stop_token stop;
+  WorkLine* line = nullptr;  ///< where it is shown how far the work has come; never null, but for the publisher
 };
 
 /// Runs a publisher process at a rate and a recorder process, and counts everything three times: by
@@ -23,7 +25,8 @@ struct RecordBenchOptions {
 /// them it runs loops that append the same messages to a bag, and to a bare file, as fast as they can.
 /// With `pairs` it measures instead, in turns, the times of a plan beside which a recorder is started,
 /// stopped and started again, and of one without.
-/// Errors   kUnavailable, kIo; kCancelled. Lost messages are a result, not an error.
+/// Errors   kUnavailable, kIo; kCancelled after a stop request, when what was finished has been printed and written.
+///          Lost messages are a result, not an error.
 Result<void> bench_record(const RecordBenchOptions& options);
 
 /// Is the publisher: waits for a reader, writes, waits until all was received; says how it went in

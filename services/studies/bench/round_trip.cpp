@@ -54,7 +54,8 @@ RolloutBatch empty_batch(const physics_pool::Scene& scene) {
 
 }  // namespace
 
-Result<Measurements> measure_round_trip(const Settings& settings) {
+Result<void> measure_round_trip(const Settings& settings) {
+  settings.announce(1);
   constexpr int kTrips = 100;
   auto scene_result = clutter(5);
   if (!scene_result) return scene_result.error();
@@ -76,15 +77,16 @@ Result<Measurements> measure_round_trip(const Settings& settings) {
   Trips pool_trips, bare_trips;
   auto result = compare({"pool over DDS", [&] { return through_pool(swarm.pool(), batch, kTrips, pool_trips); }},
                         {"bare echo", [&] { return through_echo(echo, assignment_of(batch), kTrips, bare_trips); }},
-                        swarm.turns(settings.repeats, settings.stop));
+                        swarm.turns(settings.turns()));
   if (!result) return result.error();
   result->name = "round-trip";
   result->unit = "us";
   result->aim = Aim{Aim::Kind::kAtMost, 1.5};
-  result->details = {{"trips", settings.repeats * kTrips},
+  result->details = {{"trips", static_cast<double>(result->a.size() * kTrips)},
                      {"p99_a", common::quantile(pool_trips.all(), 0.99)},
                      {"p99_b", common::quantile(bare_trips.all(), 0.99)}};
-  return Measurements{*std::move(result)};
+  settings.keep(*std::move(result));
+  return {};
 }
 
 namespace {
@@ -157,7 +159,12 @@ class Link {
   Link(std::string name, const common::LinkQuality& quality, const Settings& settings)
       : name_(std::move(name)), quality_(quality), settings_(settings) {}
 
-  Result<Measurements> measure(const common::Hosts& hosts) {
+  const common::LinkQuality& quality() const { return quality_; }
+
+  // How many measurements measure() makes.
+  int count() const { return 1 + (quality_.perfect() ? 6 : 3); }
+
+  Result<void> measure(const common::Hosts& hosts) const {
     auto scene_result = clutter(5);
     if (!scene_result) return scene_result.error();
     auto keys_result = TemporaryKeystore::make();
@@ -186,7 +193,7 @@ class Link {
           !ok)
         return ok.error();
     }
-    return std::move(measurements_);
+    return {};
   }
 
  private:
@@ -201,10 +208,10 @@ class Link {
   }
 
   Result<void> add(const std::string& what, const std::string& unit, Domain& a, Domain& b,
-                   const std::function<Result<Sample>(Domain&)>& run) {
+                   const std::function<Result<Sample>(Domain&)>& run) const {
     a.trips = b.trips = {};
-    auto result = compare({"protected", [&] { return run(a); }}, {"unprotected", [&] { return run(b); }},
-                          {.repeats = settings_.repeats, .stop = settings_.stop});
+    auto result =
+        compare({"protected", [&] { return run(a); }}, {"unprotected", [&] { return run(b); }}, settings_.turns());
     if (!result) return Error{result.error().code, fmt::format("{}/{}: {}", what, name_, result.error().message)};
     result->name = fmt::format("{}/{}", what, name_);
     result->unit = unit;
@@ -212,28 +219,25 @@ class Link {
       result->details = {{"p99_a", common::quantile(a.trips.all(), 0.99)},
                          {"p99_b", common::quantile(b.trips.all(), 0.99)}};
     }
-    settings_.on_news(one_line(*result));
-    measurements_.push_back(*std::move(result));
+    settings_.keep(*std::move(result));
     return {};
   }
 
   const std::string name_;
   const common::LinkQuality quality_;
   const Settings& settings_;
-  Measurements measurements_;
 };
 
 }  // namespace
 
-Result<Measurements> measure_hosts(const Settings& settings) {
-  Measurements all;
-  for (const auto& [name, quality] : {std::pair("good", common::LinkQuality{}), std::pair("bad", kBadLink)}) {
-    Link link(name, quality, settings);
-    auto result = measure_on_hosts(2, quality, [&](const common::Hosts& hosts) { return link.measure(hosts); });
-    if (!result) return result.error();
-    all.insert(all.end(), result->begin(), result->end());
+Result<void> measure_hosts(const Settings& settings) {
+  const Link links[] = {{"good", {}, settings}, {"bad", kBadLink, settings}};
+  for (const Link& link : links) settings.announce(link.count());
+  for (const Link& link : links) {
+    auto ok = measure_on_hosts(2, link.quality(), [&](const common::Hosts& hosts) { return link.measure(hosts); });
+    if (!ok) return ok;
   }
-  return all;
+  return {};
 }
 
 }  // namespace jostle::studies

@@ -55,7 +55,7 @@ Result<Measurement> measure_with(int workers, const Settings& settings, const co
 
   auto result = compare({"without gaps", [&]() -> Result<Sample> { return waiting_without_gaps(batch, workers); }},
                         {"pool over DDS", [&] { return time_waiting(pool, batch, settings.stop); }},
-                        (*swarm_result)->turns(settings.repeats, settings.stop));
+                        (*swarm_result)->turns(settings.turns()));
   if (!result) return result.error();
   result->name = fmt::format("scheduling/{}", workers);
   result->unit = "ms";
@@ -66,7 +66,6 @@ Result<Measurement> measure_with(int workers, const Settings& settings, const co
                      {"gathering_s", gathering},
                      {"reissued", static_cast<double>(status.reissued)},
                      {"duplicates", static_cast<double>(status.duplicates)}};
-  settings.on_news(one_line(*result));
   return result;
 }
 
@@ -92,28 +91,28 @@ Result<Measurement> measure_across(int workers, const Settings& settings, const 
 
 }  // namespace
 
-Result<Measurements> measure_scheduling(const Settings& settings) {
-  Measurements measurements;
+Result<void> measure_scheduling(const Settings& settings) {
+  settings.announce(static_cast<int>(settings.workers.size()));
   for (const int workers : settings.workers) {
     auto result = measure_with(workers, settings);
     if (!result) return result.error();
-    measurements.push_back(*std::move(result));
+    settings.keep(*std::move(result));
   }
-  return measurements;
+  return {};
 }
 
-Result<Measurements> measure_hosts_scheduling(const Settings& settings) {
-  Measurements measurements;
+Result<void> measure_hosts_scheduling(const Settings& settings) {
+  settings.announce(static_cast<int>(settings.workers.size()));
   for (const int workers : settings.workers) {
-    auto result = measure_on_hosts(1 + hosts_for(workers), {}, [&](const common::Hosts& hosts) -> Result<Measurements> {
+    auto ok = measure_on_hosts(1 + hosts_for(workers), {}, [&](const common::Hosts& hosts) -> Result<void> {
       auto one_result = measure_across(workers, settings, hosts);
       if (!one_result) return one_result.error();
-      return Measurements{*std::move(one_result)};
+      settings.keep(*std::move(one_result));
+      return {};
     });
-    if (!result) return result.error();
-    measurements.push_back(std::move(result->front()));
+    if (!ok) return ok;
   }
-  return measurements;
+  return {};
 }
 
 }  // namespace jostle::studies

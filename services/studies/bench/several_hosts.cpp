@@ -8,12 +8,12 @@
 
 namespace jostle::studies {
 
-Result<Measurements> measure_on_hosts(int count, const common::LinkQuality& quality,
-                                      const std::function<Result<Measurements>(const common::Hosts&)>& measure) {
+Result<void> measure_on_hosts(int count, const common::LinkQuality& quality,
+                              const std::function<Result<void>(const common::Hosts&)>& measure) {
   auto hosts_result = common::Hosts::make(count, quality);
   if (!hosts_result) return hosts_result.error();
   const common::Hosts& hosts = **hosts_result;
-  std::optional<Result<Measurements>> result;
+  std::optional<Result<void>> result;
   hosts.on(1, [&] { result = measure(hosts); });
   return *std::move(result);
 }

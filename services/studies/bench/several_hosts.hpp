@@ -15,8 +15,8 @@ inline constexpr common::LinkQuality kBadLink{.delay = std::chrono::milliseconds
 
 /// Runs `measure` on host 1 of so many: all clients, participants and threads that it makes are there.
 /// Errors   the measurement's; kUnavailable without the right to make hosts
-Result<Measurements> measure_on_hosts(int count, const common::LinkQuality& quality,
-                                      const std::function<Result<Measurements>(const common::Hosts&)>& measure);
+Result<void> measure_on_hosts(int count, const common::LinkQuality& quality,
+                              const std::function<Result<void>(const common::Hosts&)>& measure);
 
 /// Identities `robot` and `worker` of a protected domain, gone at the end of the scope.
 class TemporaryKeystore {

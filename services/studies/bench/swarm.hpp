@@ -101,8 +101,10 @@ class Swarm {
   pool::RemotePool& pool() { return pool_; }
   const wire::Participant& participant() const { return participant_; }
   Helpers& helpers() { return helpers_; }
-  Turns turns(int repeats, std::stop_token stop) const {
-    return {.repeats = repeats, .stop = stop, .cpu_seconds = [this] { return helpers_.cpu_seconds(); }};
+  /// The same turns, in which the workers' CPU time counts as well.
+  Turns turns(Turns turns) const {
+    turns.cpu_seconds = [this] { return helpers_.cpu_seconds(); };
+    return turns;
   }
 
  private:

@@ -109,9 +109,12 @@ class Outage {
                                                  kLongestReturn.count())};
   }
 
-  // Seconds from plugging it in to the next result from there, in the same run. Of the
+  // Seconds from plugging it in to the next result from there, in the same run; infinite if there was none. Of the
   // runs that count: the first one of compare() does not.
-  std::vector<double> returns() const { return {returns_.begin() + 1, returns_.end()}; }
+  std::vector<double> returns() const {
+    if (returns_.empty()) return {};
+    return {returns_.begin() + 1, returns_.end()};
+  }
 
  private:
   static constexpr std::chrono::seconds kLongestReturn{20};
@@ -151,8 +154,7 @@ Result<Measurement> measure_outage(const common::Hosts& hosts, std::chrono::mill
   Outage outage(hosts, ear, swarm, away);
 
   auto result = compare({"unplugged", [&] { return outage.run(*work_result, settings.stop); }},
-                        {"left alone", [&] { return work_result->run(settings.stop); }},
-                        swarm.turns(settings.repeats, settings.stop));
+                        {"left alone", [&] { return work_result->run(settings.stop); }}, swarm.turns(settings.turns()));
   if (!result) return result.error();
   result->name = fmt::format("unplugged/{:.1f}s", std::chrono::duration<double>(away).count());
   result->unit = "s";
@@ -168,33 +170,28 @@ Result<Measurement> measure_outage(const common::Hosts& hosts, std::chrono::mill
                      {"worst_cost_s", std::ranges::max(costs)},
                      {"capacity_lost_s", floor},
                      {"used_again_after_s", common::median(returns)},
-                     {"used_again_at_worst_s", std::ranges::max(returns)}};
-  settings.on_news(fmt::format(
-      "{}; costs {:.2f} s ({:.2f} to {:.2f}), of which {:.2f} s for the workers that were away; "
-      "used again {:.2f} s after it was plugged in",
-      one_line(*result), common::median(costs), interval.low, interval.high, floor, common::median(returns)));
+                     {"used_again_at_worst_s", common::quantile(returns, 1.0)}};
   return result;
 }
 
 }  // namespace
 
-Result<Measurements> measure_unplugged(const Settings& settings) {
-  Measurements measurements;
-  for (const auto& [name, quality] : {std::pair("good", common::LinkQuality{}), std::pair("bad", kBadLink)}) {
-    auto result = measure_on_hosts(1 + kWorkers, quality, [&](const common::Hosts& hosts) -> Result<Measurements> {
-      Measurements some;
+Result<void> measure_unplugged(const Settings& settings) {
+  const std::pair<const char*, common::LinkQuality> links[] = {{"good", {}}, {"bad", kBadLink}};
+  settings.announce(static_cast<int>(std::size(links) * std::size(kAway)));
+  for (const auto& [name, quality] : links) {
+    auto ok = measure_on_hosts(1 + kWorkers, quality, [&](const common::Hosts& hosts) -> Result<void> {
       for (const std::chrono::milliseconds away : kAway) {
         auto outage_result = measure_outage(hosts, away, settings);
         if (!outage_result) return outage_result.error();
         outage_result->name += fmt::format("/{}", name);
-        some.push_back(*std::move(outage_result));
+        settings.keep(*std::move(outage_result));
       }
-      return some;
+      return {};
     });
-    if (!result) return result.error();
-    measurements.insert(measurements.end(), result->begin(), result->end());
+    if (!ok) return ok;
   }
-  return measurements;
+  return {};
 }
 
 }  // namespace jostle::studies

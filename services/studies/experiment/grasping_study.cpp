@@ -2,30 +2,35 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <mutex>
-#include <tuple>
+#include <optional>
 
-#include "idl/text/yaml_fields.hpp"
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/objective/scorer.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "physics_pool/uncertainty/belief.hpp"
+#include "services/common/charts/statistics.hpp"
 #include "services/common/process/files.hpp"
+#include "services/common/results/results.hpp"
+#include "services/common/results/table.hpp"
+#include "services/studies/experiment/options.hpp"
 #include "services/task/session/composition.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 
 namespace jostle::studies {
 namespace {
 
+using nlohmann::json;
 using physics_pool::Scene;
 using physics_pool::Uncertainty;
+using planners::Ending;
 
 GraspingStudy read(yaml::Fields& fields, std::string& parameters) {
-  GraspingStudy study;
-  fields.required("title", study.title);
+  GraspingStudy study{.about = read_about(fields)};
   fields.required("parameters", parameters);
   fields.optional("objects", study.objects);
   fields.section("seeds", true, [&](yaml::Fields& seeds) {
@@ -49,73 +54,92 @@ double execution_cost(const physics_pool::TaskGeometry& geometry, const physics_
   return sum;
 }
 
-Result<planners::Outcome> grasp(const GraspingStudy& study, const GraspingRun& run, double& cost,
-                                std::stop_token stop) {
-  const Uncertainty level = *physics_pool::parse_uncertainty(run.level);
-  auto scene_result = physics_pool::generate_chapter3({.objects = study.objects, .seed = run.seed});
+// One scene to be planned and executed.
+struct Case {
+  std::string level, controller;
+  std::uint64_t seed = 0;
+
+  std::string name() const { return fmt::format("{} {} seed {}", level, controller, seed); }
+};
+
+// A run's numbers; those that were not come to be are null.
+json record_of(const Case& one, const planners::Outcome& outcome, double execution_cost) {
+  const bool has_plan = !outcome.first_plan.controls.values.empty();
+  return {{"seed", one.seed},
+          {"level", one.level},
+          {"controller", one.controller},
+          {"success", outcome.success},
+          {"ending", planners::to_string(outcome.ending)},
+          {"reason", outcome.reason},
+          {"plan_hash", has_plan ? json(to_string(hash_of(outcome.first_plan.controls.values))) : json()},
+          {"plan_seconds", has_plan ? json(outcome.plan_time.count()) : json()},
+          {"planning_seconds", outcome.planning_time.count()},
+          {"total_seconds", outcome.total_time.count()},
+          {"replans", outcome.replans},
+          {"actions", outcome.actions},
+          {"rollouts", outcome.rollouts},
+          {"execution_cost", common::number_or_null(execution_cost)}};
+}
+
+json record_of(const Case& one, const std::string& error) {
+  json record = record_of(one, planners::Outcome{.ending = Ending::kBroken, .reason = error}, common::kNone);
+  for (const char* key : {"planning_seconds", "total_seconds", "replans", "actions", "rollouts"}) record[key] = nullptr;
+  return record;
+}
+
+Result<json> grasp(const GraspingStudy& study, const Case& one, std::stop_token stop) {
+  const Uncertainty level = *physics_pool::parse_uncertainty(one.level);
+  auto scene_result = physics_pool::generate_chapter3({.objects = study.objects, .seed = one.seed});
   if (!scene_result) return scene_result.error();
   const Scene& scene = *scene_result;
-  const Scene belief = physics_pool::perturb(scene, level, run.seed);
+  const Scene belief = physics_pool::perturb(scene, level, one.seed);
   auto truth_result = physics_pool::World::compile(scene);
   if (!truth_result) return truth_result.error();
   physics_pool::ThreadPool pool(1);
   auto run_result = task::Composition::make({.belief = belief,
                                              .belief_is_exact = level == Uncertainty::kNone,
                                              .parameters = study.parameters,
-                                             .controller = run.controller,
-                                             .seed = run.seed},
+                                             .controller = one.controller,
+                                             .seed = one.seed},
                                             pool);
   if (!run_result) return run_result.error();
-  physics_pool::ExecutionWorld world(*truth_result, {.sigma = physics_pool::velocity_noise(level), .seed = run.seed});
+  physics_pool::ExecutionWorld world(*truth_result, {.sigma = physics_pool::velocity_noise(level), .seed = one.seed});
   world::SimulatedRobot robot(world);
   world::SimulatedObjects objects(world, belief);
   auto outcome_result = run_result->perform(robot, objects, {}, stop);
-  if (outcome_result) {
-    cost = execution_cost(run_result->geometry(), study.parameters.objective, outcome_result->observed);
-  }
-  return outcome_result;
-}
-
-template <class Value>
-common::Mean mean_over(const std::vector<const GraspingRun*>& runs, Value value) {
-  std::vector<double> values;
-  for (const GraspingRun* run : runs) values.push_back(value(*run));
-  return common::mean_of(values);
+  if (!outcome_result) return outcome_result.error();
+  // Nothing was executed, nothing has a cost.
+  const double cost = outcome_result->actions > 0
+                          ? execution_cost(run_result->geometry(), study.parameters.objective, outcome_result->observed)
+                          : common::kNone;
+  return record_of(one, *outcome_result, cost);
 }
 
 // Runs of one level and one controller.
 struct Cell {
   std::string level, controller;
-  std::vector<const GraspingRun*> runs, successes;
-};
+  int runs = 0, timed_out = 0, broken = 0;  // runs: that came to an end, whatever it was; broken ones did not
+  std::vector<const json*> successes;
 
-std::vector<Cell> cells(const GraspingStudy& study, const std::vector<GraspingRun>& runs) {
-  std::vector<Cell> result;
-  for (const std::string& level : study.levels) {
-    for (const std::string& controller : study.controllers) {
-      Cell cell{.level = level, .controller = controller};
-      for (const GraspingRun& run : runs) {
-        if (run.level != level || run.controller != controller) continue;
-        cell.runs.push_back(&run);
-        if (run.outcome.success) cell.successes.push_back(&run);
-      }
-      result.push_back(std::move(cell));
+  void add(const json& run) {
+    const std::string ending = run["ending"];
+    if (ending == planners::to_string(Ending::kBroken)) {
+      ++broken;
+      return;
     }
+    ++runs;
+    if (run["success"]) successes.push_back(&run);
+    if (ending == planners::to_string(Ending::kTimedOut)) ++timed_out;
   }
-  return result;
-}
 
-planners::Ending ending_of(const GraspingRun& run) {
-  return run.error.empty() ? run.outcome.ending : planners::Ending::kBroken;
-}
-double replans(const GraspingRun& run) { return run.outcome.replans; }
-double seconds(const GraspingRun& run) { return run.outcome.total_time.count(); }
-double plan_seconds(const GraspingRun& run) { return run.outcome.plan_time.count(); }
-double cost(const GraspingRun& run) { return run.execution_cost; }
+  common::Share share() const { return common::wilson_interval(static_cast<int>(successes.size()), runs); }
 
-common::Share share_of(const Cell& cell) {
-  return common::wilson_interval(static_cast<int>(cell.successes.size()), static_cast<int>(cell.runs.size()));
-}
+  common::Mean over_successes(const char* key) const {
+    std::vector<double> values;
+    for (const json* run : successes) values.push_back((*run)[key]);
+    return common::mean_of(values);
+  }
+};
 
 // Levels and controllers that exist; `where` they were asked for.
 Result<void> check(const GraspingStudy& study, const std::string& where) {
@@ -137,38 +161,132 @@ Result<void> check(const GraspingStudy& study, const std::string& where) {
 
 class GraspingStudyRunner final : public Study {
  public:
-  explicit GraspingStudyRunner(GraspingStudy study) : study_(std::move(study)) {}
+  explicit GraspingStudyRunner(GraspingStudy study) : Study(study.about), study_(std::move(study)) {}
 
-  const std::string& title() const override { return study_.title; }
+  void add_options(CLI::App& app) override {
+    add_jobs_option(app, jobs_);
+    seeds_.add_to(app, study_.first_seed, study_.last_seed);
+    app.add_option("--levels", study_.levels, "Uncertainty levels: none, low, medium, high")
+        ->delimiter(',')
+        ->capture_default_str();
+    app.add_option("--controllers", study_.controllers, planners::controller_help())
+        ->delimiter(',')
+        ->capture_default_str();
+    add_timeout_option(app, timeout_);
+  }
 
-  Result<StudyReport> run(const StudyOptions& options) override {
-    if (!options.models.empty() || options.samples) {
-      return Error{Code::kInvalidArgument,
-                   "this study has no --models and no --samples, wanted --seeds, --levels, "
-                   "--controllers, --timeout"};
+  Result<std::vector<std::string>> prepare() override {
+    if (auto ok = seeds_.apply(study_.first_seed, study_.last_seed); !ok) return ok.error();
+    if (auto ok = check(study_, "--"); !ok) return ok.error();
+    if (timeout_) study_.parameters.limits.timeout = std::chrono::milliseconds(std::llround(*timeout_ * 1e3));
+    std::vector<std::string> names;
+    cases_.clear();
+    for (const std::string& level : study_.levels) {
+      for (const std::string& controller : study_.controllers) {
+        for (std::uint64_t seed = study_.first_seed; seed <= study_.last_seed; ++seed) {
+          cases_.push_back({level, controller, seed});
+          names.push_back(cases_.back().name());
+        }
+      }
     }
-    GraspingStudy study = study_;
-    if (options.seeds) std::tie(study.first_seed, study.last_seed) = *options.seeds;
-    if (!options.levels.empty()) study.levels = options.levels;
-    if (!options.controllers.empty()) study.controllers = options.controllers;
-    if (options.timeout) study.parameters.limits.timeout = *options.timeout;
-    if (auto ok = check(study, "--"); !ok) return ok.error();
-    const auto total = study.levels.size() * study.controllers.size() * (study.last_seed - study.first_seed + 1);
-    std::size_t done = 0;
-    bool broken = false;
-    const auto runs = run_study(study, options, [&](const GraspingRun& run) {
-      broken = broken || !run.error.empty();
-      options.on_progress(fmt::format("[{:>3}/{}] {:<7} {} seed {:<4} {:<7} {} ({:.0f} s, {} re-plans)", ++done, total,
-                                      run.level, run.controller, run.seed, run.outcome.success ? "ok" : "FAILED",
-                                      run.error.empty() ? run.outcome.reason : run.error,
-                                      run.outcome.total_time.count(), run.outcome.replans));
-    });
-    if (options.stop.stop_requested()) return Error{Code::kCancelled, "experiment: stopped on request"};
-    return StudyReport{.table = study_table(study, runs), .json = study_json(study, runs), .broken = broken};
+    return names;
+  }
+
+  json settings() const override { return {{"timeout_s", timeout_ ? json(*timeout_) : json()}}; }
+  int at_a_time() const override { return jobs_; }
+
+  Result<json> run_case(std::size_t index, std::stop_token stop) override {
+    return grasp(study_, cases_[index], std::move(stop));
+  }
+
+  std::string news_of(const json& run) const override {
+    return fmt::format("{}, {} ({:.0f} s, {} re-plans)", run["ending"].get<std::string>(),
+                       run["reason"].get<std::string>(), run["total_seconds"].get<double>(), run["replans"].get<int>());
+  }
+
+  StudyReport report(const std::vector<json>& records) const override {
+    std::vector<json> runs;  // with those that broke
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      if (records[i].is_null()) continue;
+      runs.push_back(records[i].contains("error") ? record_of(cases_[i], records[i]["error"].get<std::string>())
+                                                  : records[i]);
+    }
+    const std::vector<Cell> all = cells(runs);
+    return {.table = table_of(all), .json = json_of(all, runs)};
   }
 
  private:
+  std::vector<Cell> cells(const std::vector<json>& runs) const {
+    std::vector<Cell> result;
+    for (const std::string& level : study_.levels) {
+      for (const std::string& controller : study_.controllers) {
+        Cell cell{.level = level, .controller = controller};
+        for (const json& run : runs) {
+          if (run["level"] == level && run["controller"] == controller) cell.add(run);
+        }
+        result.push_back(std::move(cell));
+      }
+    }
+    return result;
+  }
+
+  std::string thesis_of(const Cell& cell) const {
+    const auto level = study_.thesis.find(cell.level);
+    if (level == study_.thesis.end()) return "-";
+    const auto rate = level->second.find(cell.controller);
+    return rate == level->second.end() ? "-" : fmt::format("{:.2f}", rate->second);
+  }
+
+  std::string table_of(const std::vector<Cell>& all) const {
+    std::vector<std::vector<std::string>> ends{
+        {"level", "controller", "success", "95 % interval", "thesis", "timed out"}};
+    std::vector<std::vector<std::string>> means{
+        {"level", "controller", "re-plans", "execution cost", "first plan, s", "total, s"}};
+    int broken = 0;
+    for (const Cell& cell : all) {
+      const common::Share share = cell.share();
+      broken += cell.broken;
+      ends.push_back({cell.level, cell.controller, fmt::format("{}/{}", share.successes, share.runs),
+                      common::interval_text(share.low, share.high), thesis_of(cell), std::to_string(cell.timed_out)});
+      means.push_back({cell.level, cell.controller, to_text(cell.over_successes("replans"), 1),
+                       to_text(cell.over_successes("execution_cost"), 0),
+                       to_text(cell.over_successes("plan_seconds"), 1),
+                       to_text(cell.over_successes("total_seconds"), 1)});
+    }
+    std::string text = fmt::format("{}\n\n{}\n{}", title(), common::table(ends), common::table(means));
+    text +=
+        "\nRe-plans, cost and times: mean of the successful runs, and 95 % interval of the mean where there\n"
+        "are two or more. One thread per run. The world stands still while its planner thinks.\n";
+    if (broken > 0) text += fmt::format("Parts of the system failed in {} more runs, which count nowhere.\n", broken);
+    return text;
+  }
+
+  json json_of(const std::vector<Cell>& all, const std::vector<json>& runs) const {
+    json result{{"title", title()}, {"objects", study_.objects}, {"rows", json::array()}, {"runs", runs}};
+    for (const Cell& cell : all) {
+      const common::Share share = cell.share();
+      json row{{"level", cell.level},
+               {"controller", cell.controller},
+               {"successes", share.successes},
+               {"runs", share.runs},
+               {"timed_out", cell.timed_out},
+               {"broken", cell.broken},
+               {"interval", {common::number_or_null(share.low), common::number_or_null(share.high)}}};
+      for (const char* key : {"replans", "execution_cost", "plan_seconds", "total_seconds"}) {
+        const common::Mean mean = cell.over_successes(key);
+        row[key] = common::number_or_null(mean.value);
+        row[std::string(key) + "_half_width"] = common::number_or_null(mean.half_width);
+      }
+      result["rows"].push_back(std::move(row));
+    }
+    return result;
+  }
+
   GraspingStudy study_;
+  int jobs_ = 1;
+  SeedsOption seeds_;
+  std::optional<double> timeout_;  // s
+  std::vector<Case> cases_;
 };
 
 }  // namespace
@@ -181,91 +299,6 @@ Result<std::unique_ptr<Study>> read_grasping_study(yaml::Fields& fields, const s
   study.parameters = *parameters_result;
   if (auto ok = check(study, origin + ": "); !ok) return ok.error();
   return std::unique_ptr<Study>(std::make_unique<GraspingStudyRunner>(std::move(study)));
-}
-
-std::vector<GraspingRun> run_study(const GraspingStudy& study, const StudyOptions& options,
-                                   const std::function<void(const GraspingRun&)>& on_run) {
-  std::vector<GraspingRun> runs;
-  for (const std::string& level : study.levels) {
-    for (const std::string& controller : study.controllers) {
-      for (std::uint64_t seed = study.first_seed; seed <= study.last_seed; ++seed) {
-        runs.push_back({.seed = seed, .level = level, .controller = controller});
-      }
-    }
-  }
-  std::mutex reporting;
-  run_side_by_side(runs.size(), options.jobs, options.stop, [&](std::size_t i) {
-    GraspingRun& run = runs[i];
-    auto outcome_result = grasp(study, run, run.execution_cost, options.stop);
-    if (outcome_result) {
-      run.outcome = std::move(outcome_result).value();
-    } else {
-      run.error = outcome_result.error().message;
-    }
-    const std::lock_guard lock(reporting);
-    on_run(run);
-  });
-  return runs;
-}
-
-std::string study_table(const GraspingStudy& study, const std::vector<GraspingRun>& runs) {
-  std::string text = study.title + "\n\n";
-  text += fmt::format("{:<8}{:<12}{:<10}{:<16}{:<9}{:<16}{:<18}{:<16}{}\n", "level", "controller", "success",
-                      "95 % interval", "thesis", "re-plans", "execution cost", "plan, s", "total, s");
-  for (const Cell& cell : cells(study, runs)) {
-    const common::Share share = share_of(cell);
-    std::string thesis = "-";
-    if (const auto level = study.thesis.find(cell.level); level != study.thesis.end()) {
-      if (const auto rate = level->second.find(cell.controller); rate != level->second.end()) {
-        thesis = fmt::format("{:.2f}", rate->second);
-      }
-    }
-    const auto with_interval = [&](auto value, int digits) {
-      const common::Mean mean = mean_over(cell.successes, value);
-      return fmt::format("{:.{}f} ± {:.{}f}", mean.value, digits, mean.half_width, digits);
-    };
-    text += fmt::format("{:<8}{:<12}{:<10}{:<16}{:<9}{:<16}{:<18}{:<16}{}\n", cell.level, cell.controller,
-                        fmt::format("{}/{}", share.successes, share.runs),
-                        fmt::format("{:.2f} to {:.2f}", share.low, share.high), thesis, with_interval(replans, 1),
-                        with_interval(cost, 0), with_interval(plan_seconds, 1), with_interval(seconds, 1));
-  }
-  text +=
-      "\nRe-plans, cost and times: mean of the successful runs and 95 % interval of the mean;\n"
-      "one thread per run. The world stands still while its planner thinks.\n";
-  return text;
-}
-
-nlohmann::json study_json(const GraspingStudy& study, const std::vector<GraspingRun>& runs) {
-  nlohmann::json json{{"title", study.title}, {"objects", study.objects}};
-  for (const Cell& cell : cells(study, runs)) {
-    const common::Share share = share_of(cell);
-    json["rows"].push_back({{"level", cell.level},
-                            {"controller", cell.controller},
-                            {"successes", share.successes},
-                            {"runs", share.runs},
-                            {"interval", {share.low, share.high}},
-                            {"replans", mean_over(cell.successes, replans).value},
-                            {"execution_cost", mean_over(cell.successes, cost).value},
-                            {"plan_seconds", mean_over(cell.successes, plan_seconds).value},
-                            {"total_seconds", mean_over(cell.successes, seconds).value}});
-  }
-  for (const GraspingRun& run : runs) {
-    const planners::Outcome& outcome = run.outcome;
-    json["runs"].push_back({{"seed", run.seed},
-                            {"level", run.level},
-                            {"controller", run.controller},
-                            {"success", outcome.success},
-                            {"ending", planners::to_string(ending_of(run))},
-                            {"reason", run.error.empty() ? outcome.reason : run.error},
-                            {"plan_hash", to_string(hash_of(outcome.first_plan.controls.values))},
-                            {"plan_seconds", outcome.plan_time.count()},
-                            {"total_seconds", outcome.total_time.count()},
-                            {"replans", outcome.replans},
-                            {"actions", outcome.actions},
-                            {"rollouts", outcome.rollouts},
-                            {"execution_cost", run.execution_cost}});
-  }
-  return json;
 }
 
 }  // namespace jostle::studies

@@ -1,13 +1,10 @@
 #include "services/studies/experiment/prediction_study.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <map>
-#include <mutex>
 #include <numbers>
 
 #include "physics_pool/coarse/coarse_model.hpp"
@@ -17,11 +14,14 @@
 #include "physics_pool/uncertainty/belief.hpp"
 #include "services/common/charts/statistics.hpp"
 #include "services/common/process/files.hpp"
-#include "services/common/terminal/progress_line.hpp"
+#include "services/common/results/results.hpp"
+#include "services/common/results/table.hpp"
+#include "services/studies/experiment/options.hpp"
 
 namespace jostle::studies {
 namespace {
 
+using nlohmann::json;
 using physics_pool::PlanarLayout;
 using physics_pool::Scene;
 
@@ -71,12 +71,13 @@ Distance distance(const StateLayout& layout, const Trajectory& a, const Trajecto
   return result;
 }
 
-// What one case gave with one model; empty if nothing was pushed.
-struct Made {
-  std::vector<Distance> levels;  // [N + 1], from the truth
-  double moved = 0.0;            // m, mean over sliders, in truth
-  std::string problem;
-};
+json to_json(const Distance& d) {
+  return {{"translation_mm", d.translation_mm},
+          {"rotation_deg", d.rotation_deg},
+          {"positions_mm", d.positions_mm},
+          {"state", d.state},
+          {"by_slider_mm", d.by_slider_mm}};
+}
 
 // The scene with everything where a state has it.
 Scene located(const Scene& scene, const State& x) {
@@ -116,136 +117,129 @@ Result<Trajectory> happen(const PredictionStudy& study, const Scene& scene, cons
   return trajectory;
 }
 
-Made make(const PredictionStudy& study, const PredictionCases& cases, std::size_t index, const std::string& model,
-          physics_pool::Pool& pool, std::stop_token stop) {
+// What one case gives with one model; no levels if nothing was pushed.
+Result<json> predict(const PredictionStudy& study, const PredictionCases& cases, std::size_t index,
+                     const std::string& model, physics_pool::Pool& pool, std::stop_token stop) {
   const PredictionCase& one = cases.cases[index];
   const Scene& scene = cases.scenes[one.scene];
   auto coarse_result = physics_pool::make_coarse_model(common::coarse_model_name(model), scene);
-  if (!coarse_result) return {.problem = coarse_result.error().message};
+  if (!coarse_result) return coarse_result.error();
   const physics_pool::PlanarUpdate update(scene);
   auto levels_result = physics_pool::predict_levels(pool, one.batch, update, **coarse_result,
                                                     std::chrono::steady_clock::now() + kPatience, stop);
-  if (!levels_result) return {.problem = levels_result.error().message};
+  if (!levels_result) return levels_result.error();
   Trajectory truth = levels_result->back();
   if (study.reality != physics_pool::Uncertainty::kNone) {
     auto real_result = happen(study, scene, one.batch, study.seed + index);
-    if (!real_result) return {.problem = real_result.error().message};
+    if (!real_result) return real_result.error();
     truth = std::move(real_result).value();
   }
-  Made made;
-  double farthest = 0.0;
+  double farthest = 0.0, sum = 0.0;
   for (const ObjectSlot& slot : update.layout().objects) {
     const auto q = static_cast<std::size_t>(slot.q);
     const double way =
         std::hypot(truth.back().q[q] - truth.front().q[q], truth.back().q[q + 1] - truth.front().q[q + 1]);
     farthest = std::max(farthest, way);
-    made.moved += way / static_cast<double>(update.layout().objects.size());
+    sum += way;
   }
-  if (farthest < kMoved) return made;
-  for (const Trajectory& level : *levels_result) made.levels.push_back(distance(update.layout(), level, truth));
-  return made;
+  json levels = json::array();
+  if (farthest >= kMoved) {
+    for (const Trajectory& level : *levels_result) levels.push_back(to_json(distance(update.layout(), level, truth)));
+  }
+  return json{{"group", one.group},
+              {"model", model},
+              {"moved_m", sum / static_cast<double>(update.layout().objects.size())},
+              {"levels", std::move(levels)}};
 }
 
 // All cases of one group with one model.
 struct Cell {
   std::string group, model;
-  std::vector<const Made*> made;
+  std::vector<const json*> made;
 
-  int iterations() const { return static_cast<int>(made.front()->levels.size()) - 1; }
+  std::size_t iterations() const { return made.front()->at("levels").size() - 1; }
 
-  template <class Value>
-  std::vector<double> values(int k, Value value) const {
+  std::vector<double> values(std::size_t iteration, const char* key) const {
     std::vector<double> result;
-    for (const Made* one : made) result.push_back(value(one->levels[static_cast<std::size_t>(k)]));
+    for (const json* one : made) result.push_back(one->at("levels")[iteration][key]);
     return result;
   }
+
+  common::Mean mean(std::size_t iteration, const char* key) const { return common::mean_of(values(iteration, key)); }
 };
 
-double translation(const Distance& d) { return d.translation_mm; }
-double rotation(const Distance& d) { return d.rotation_deg; }
-double positions(const Distance& d) { return d.positions_mm; }
-double state(const Distance& d) { return d.state; }
+constexpr const char *kTranslation = "translation_mm", *kRotation = "rotation_deg", *kPositions = "positions_mm",
+                     *kState = "state", *kBySlider = "by_slider_mm";
 
 class PredictionStudyRunner final : public Study {
  public:
-  explicit PredictionStudyRunner(PredictionStudy study) : study_(std::move(study)) {}
+  explicit PredictionStudyRunner(PredictionStudy study) : Study(study.about), study_(std::move(study)) {}
 
-  const std::string& title() const override { return study_.title; }
+  void add_options(CLI::App& app) override {
+    add_jobs_option(app, jobs_, "Predictions at a time");
+    app.add_option("--models", study_.models, "Coarse models, such as planar,learned")
+        ->delimiter(',')
+        ->capture_default_str();
+    if (study_.cases == PredictionStudy::Cases::kExamples) return;  // they are what they are
+    app.add_option("--samples", study_.samples, "Initial states per group")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100000));
+    app.add_option("--seeds", seed_, fmt::format("First seed of the initial states (default: {})", study_.seed));
+  }
 
-  Result<StudyReport> run(const StudyOptions& options) override {
-    if (!options.levels.empty() || !options.controllers.empty() || options.timeout) {
-      return Error{Code::kInvalidArgument,
-                   "this study has no --levels, --controllers or --timeout, wanted --models, "
-                   "--samples, --seeds FIRST"};
+  Result<std::vector<std::string>> prepare() override {
+    if (!seed_.empty()) {
+      auto seeds_result = parse_seeds(seed_);
+      if (!seeds_result) return seeds_result.error();
+      study_.seed = seeds_result->first;
     }
-    PredictionStudy study = study_;
-    if (!options.models.empty()) study.models = options.models;
-    if (options.samples) study.samples = *options.samples;
-    if (options.seeds) study.seed = options.seeds->first;
-    const PredictionCases cases = make_cases(study);
-    physics_pool::ThreadPool pool(options.jobs);
-    for (const Scene& scene : cases.scenes) {
-      if (auto ok = pool.load(scene); !ok) return ok.error();
-      for (const std::string& model : study.models) {
+    cases_ = make_cases(study_);
+    pool_ = std::make_unique<physics_pool::ThreadPool>(jobs_);
+    for (const Scene& scene : cases_.scenes) {
+      if (auto ok = pool_->load(scene); !ok) return ok.error();
+      for (const std::string& model : study_.models) {
         if (auto ok = physics_pool::make_coarse_model(common::coarse_model_name(model), scene); !ok) return ok.error();
       }
     }
-
-    const std::size_t total = cases.cases.size() * study.models.size();
-    std::vector<Made> made(total);
-    std::mutex reporting;
-    std::size_t done = 0;
-    const auto start = std::chrono::steady_clock::now();
-    run_side_by_side(total, options.jobs, options.stop, [&](std::size_t i) {
-      const std::size_t m = i % study.models.size();
-      made[i] = make(study, cases, i / study.models.size(), study.models[m], pool, options.stop);
-      const std::lock_guard lock(reporting);
-      ++done;
-      if (done % std::max<std::size_t>(total / 20, 1) != 0) return;
-      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      options.on_progress(common::progress_text("predictions", done, total, seconds));
-    });
-    if (options.stop.stop_requested()) return Error{Code::kCancelled, "experiment: stopped on request"};
-    return report(study, cases, made);
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < cases_.cases.size(); ++i) {
+      const std::string& group = cases_.cases[i].group;
+      for (const std::string& model : study_.models) {
+        names.push_back(fmt::format("{}state {}, {}", group.empty() ? "" : group + ", ", i, model));
+      }
+    }
+    return names;
   }
 
- private:
-  static StudyReport report(const PredictionStudy& study, const PredictionCases& cases, const std::vector<Made>& made) {
-    StudyReport result;
-    std::map<std::pair<std::string, std::size_t>, Cell> cells;  // by group and model, groups in order of name
-    std::vector<std::string> groups;
-    int idle = 0;
-    for (std::size_t i = 0; i < made.size(); ++i) {
-      const PredictionCase& one = cases.cases[i / study.models.size()];
-      const std::size_t model = i % study.models.size();
-      if (!made[i].problem.empty()) {
-        result.broken = true;
-        result.table += fmt::format("FAILED: {}, {}: {}\n", one.group, study.models[model], made[i].problem);
-        continue;
-      }
-      if (made[i].levels.empty()) {
-        idle += model == 0 ? 1 : 0;
-        continue;
-      }
-      if (std::ranges::find(groups, one.group) == groups.end()) groups.push_back(one.group);
-      Cell& cell = cells[{one.group, model}];
-      cell.group = one.group;
-      cell.model = study.models[model];
-      cell.made.push_back(&made[i]);
+  json settings() const override { return {{"samples", study_.samples}, {"seeds", seed_}}; }
+  int at_a_time() const override { return jobs_; }
+
+  Result<json> run_case(std::size_t index, std::stop_token stop) override {
+    return predict(study_, cases_, index / study_.models.size(), study_.models[index % study_.models.size()], *pool_,
+                   std::move(stop));
+  }
+
+  std::string news_of(const json&) const override { return "predicted"; }
+
+  StudyReport report(const std::vector<json>& records) const override {
+    StudyReport result{.table = title() + "\n", .json = {{"title", title()}, {"models", json::array()}}};
+    std::size_t idle = 0, left = 0, broken = 0;
+    for (const json& record : records) {
+      if (record.is_null() || record.contains("error"))
+        ++(record.is_null() ? left : broken);
+      else if (record["levels"].empty())
+        ++idle;
     }
-    result.table = study.title + "\n" + result.table;
-    result.json = {{"title", study.title}, {"models", nlohmann::json::array()}};
-    for (const std::string& group : groups) {
-      std::vector<Cell> row;
-      for (std::size_t m = 0; m < study.models.size(); ++m) {
-        if (const auto found = cells.find({group, m}); found != cells.end()) row.push_back(found->second);
-      }
-      add_group(study, row, result);
-    }
+    for (const std::string& group : groups_of(records)) add_group(rows_of(group, records), result);
     if (idle > 0)
-      result.table += fmt::format("\n{} of {} cases left out: nothing was pushed.\n", idle, cases.cases.size());
-    result.table += "\nMeans over the cases with 95 % intervals of the mean.\n";
-    if (!study.remark.empty()) result.table += study.remark + "\n";
+      result.table +=
+          fmt::format("\n{} of {} predictions left out: nothing was pushed.\n", idle, records.size() - left);
+    if (broken > 0)
+      result.table += fmt::format("\nParts of the system failed in {} more, which count nowhere.\n", broken);
+    result.table += "\nMeans over the predictions, and 95 % intervals of the mean where there are two or more.\n";
+    if (!study_.remark.empty()) result.table += study_.remark + "\n";
+    result.json["left_out"] = idle;
+    result.json["broken"] = broken;
     // What a reader of one model finds at the top.
     if (!result.json["models"].empty()) {
       result.json["model"] = result.json["models"][0]["model"];
@@ -254,85 +248,139 @@ class PredictionStudyRunner final : public Study {
     return result;
   }
 
-  static void add_group(const PredictionStudy& study, const std::vector<Cell>& row, StudyReport& result) {
+  bool has_figure() const override { return true; }
+
+  std::vector<common::Panel> figure(const json& report) const override {
+    const std::string key = study_.measure == Measure::kFinal   ? "trans_mm"
+                            : study_.measure == Measure::kState ? "rms_state"
+                                                                : "rms_positions_mm";
+    std::vector<common::Panel> panels;
+    std::string group;
+    for (const json& model : report.at("models")) {
+      if (panels.empty() || model.at("group") != group) {
+        group = model.at("group");
+        panels.push_back({.x_label = (group.empty() ? "" : group + ": ") + "iteration",
+                          .y_label = label(study_.measure),
+                          .log_y = true,
+                          .counts_x = true,
+                          .zero = "exact"});
+      }
+      common::Band band{.name = model.at("model")};
+      const bool has_interval = model.at("predictions") > 1;
+      for (const json& row : model.at("rows")) {
+        const double value = row.at(key),
+                     half = has_interval ? row.at(key + "_half_width").get<double>() : common::kNone;
+        band.x.push_back(row.at("iteration"));
+        band.low.push_back(value - half);
+        band.middle.push_back(value);
+        band.high.push_back(value + half);
+      }
+      panels.back().bands.push_back(std::move(band));
+    }
+    return panels;
+  }
+
+ private:
+  using Measure = PredictionStudy::Measure;
+
+  // In the order of the cases; without those in which nothing was pushed.
+  std::vector<std::string> groups_of(const std::vector<json>& records) const {
+    std::vector<std::string> groups;
+    for (const json& record : records) {
+      if (!counts(record)) continue;
+      const std::string group = record["group"];
+      if (std::ranges::find(groups, group) == groups.end()) groups.push_back(group);
+    }
+    return groups;
+  }
+
+  std::vector<Cell> rows_of(const std::string& group, const std::vector<json>& records) const {
+    std::vector<Cell> row;
+    for (const std::string& model : study_.models) {
+      Cell cell{.group = group, .model = model, .made = {}};
+      for (const json& record : records) {
+        if (counts(record) && record["group"] == group && record["model"] == model) cell.made.push_back(&record);
+      }
+      if (!cell.made.empty()) row.push_back(std::move(cell));
+    }
+    return row;
+  }
+
+  static bool counts(const json& record) {
+    return !record.is_null() && !record.contains("error") && !record["levels"].empty();
+  }
+
+  std::string thesis_of(const Cell& cell, std::size_t iteration) const {
+    const std::vector<double>&mm = study_.thesis_trans_mm, &deg = study_.thesis_rot_deg;
+    if (iteration >= mm.size() || iteration >= deg.size() || cell.model != study_.models[0]) return "-";
+    return fmt::format("{:.2f} / {:.2f}", mm[iteration], deg[iteration]);
+  }
+
+  void add_group(const std::vector<Cell>& row, StudyReport& result) const {
+    const std::string& group = row.front().group;
     std::vector<double> moved;
-    for (const Made* one : row.front().made) moved.push_back(1e3 * one->moved);
+    for (const json* one : row.front().made) moved.push_back(1e3 * one->at("moved_m").get<double>());
     const common::Mean way = common::mean_of(moved);
     double squares = 0.0;
     for (const double mm : moved) squares += (mm - way.value) * (mm - way.value);
-    const double deviation = moved.size() > 1 ? std::sqrt(squares / static_cast<double>(moved.size() - 1)) : 0.0;
+    const double deviation =
+        moved.size() > 1 ? std::sqrt(squares / static_cast<double>(moved.size() - 1)) : common::kNone;
     result.table +=
-        fmt::format("\n{}{} predictions per model; sliders moved {:.0f} ± {:.0f} mm\n",
-                    row.front().group.empty() ? "" : row.front().group + ": ", moved.size(), way.value, deviation);
-    result.table += fmt::format("{:<16}{:<11}{:<20}{:<20}{:<22}{}\n", "model", "iteration", "translation, mm",
-                                "rotation, deg", "RMS positions, mm", "thesis, mm and deg");
-    common::Panel panel{.x_label = (row.front().group.empty() ? "" : row.front().group + ": ") + "iteration",
-                        .y_label = label(study.measure),
-                        .log_y = true};
+        fmt::format("\n{}{} predictions per model; sliders moved {} mm\n", group.empty() ? "" : group + ": ",
+                    moved.size(), to_text(common::Mean{.value = way.value, .half_width = deviation}, 0));
+    std::vector<std::vector<std::string>> lines{
+        {"model", "iteration", "translation, mm", "rotation, deg", "RMS positions, mm", "thesis, mm and deg"}};
     for (const Cell& cell : row) {
-      nlohmann::json entry{{"model", cell.model},
-                           {"group", cell.group},
-                           {"predictions", cell.made.size()},
-                           {"moved_mm", way.value},
-                           {"moved_deviation_mm", deviation}};
-      common::Band band{.name = cell.model};
-      for (int k = 0; k <= cell.iterations(); ++k) {
-        const common::Mean mm = common::mean_of(cell.values(k, translation)),
-                           deg = common::mean_of(cell.values(k, rotation));
-        const common::Mean rms = common::mean_of(cell.values(k, positions)),
-                           whole = common::mean_of(cell.values(k, state));
-        std::string thesis = "-";
-        const auto at = static_cast<std::size_t>(k);
-        if (at < study.thesis_trans_mm.size() && at < study.thesis_rot_deg.size() && cell.model == study.models[0]) {
-          thesis = fmt::format("{:.2f} / {:.2f}", study.thesis_trans_mm[at], study.thesis_rot_deg[at]);
+      json entry{{"model", cell.model},
+                 {"group", cell.group},
+                 {"predictions", cell.made.size()},
+                 {"moved_mm", way.value},
+                 {"moved_deviation_mm", common::number_or_null(deviation)}};
+      for (std::size_t k = 0; k <= cell.iterations(); ++k) {
+        lines.push_back({k == 0 ? cell.model : std::string(), std::to_string(k), to_text(cell.mean(k, kTranslation), 2),
+                         to_text(cell.mean(k, kRotation), 2), to_text(cell.mean(k, kPositions), 2),
+                         thesis_of(cell, k)});
+        json numbers{{"iteration", k}, {"rms_by_slider_mm", by_slider(cell, k)}};
+        for (const auto& [name, key] : {std::pair{"trans_mm", kTranslation}, std::pair{"rot_deg", kRotation},
+                                        std::pair{"rms_positions_mm", kPositions}, std::pair{"rms_state", kState}}) {
+          const common::Mean mean = cell.mean(k, key);
+          numbers[name] = mean.value;
+          numbers[std::string(name) + "_half_width"] = common::number_or_null(mean.half_width);
         }
-        result.table += fmt::format("{:<16}{:<11}{:<20}{:<20}{:<22}{}\n", k == 0 ? cell.model : "", k,
-                                    fmt::format("{:.2f} ± {:.2f}", mm.value, mm.half_width),
-                                    fmt::format("{:.2f} ± {:.2f}", deg.value, deg.half_width),
-                                    fmt::format("{:.2f} ± {:.2f}", rms.value, rms.half_width), thesis);
-        std::vector<double> by_slider;
-        for (std::size_t i = 0; i < cell.made.front()->levels.front().by_slider_mm.size(); ++i) {
-          by_slider.push_back(
-              common::mean_of(cell.values(k, [i](const Distance& d) { return d.by_slider_mm[i]; })).value);
-        }
-        entry["rows"].push_back({{"iteration", k},
-                                 {"trans_mm", mm.value},
-                                 {"trans_mm_half_width", mm.half_width},
-                                 {"rot_deg", deg.value},
-                                 {"rot_deg_half_width", deg.half_width},
-                                 {"rms_positions_mm", rms.value},
-                                 {"rms_positions_mm_half_width", rms.half_width},
-                                 {"rms_state", whole.value},
-                                 {"rms_state_half_width", whole.half_width},
-                                 {"rms_by_slider_mm", by_slider}});
-        const common::Mean& shown = study.measure == PredictionStudy::Measure::kFinal   ? mm
-                                    : study.measure == PredictionStudy::Measure::kState ? whole
-                                                                                        : rms;
-        if (shown.value <= 0) continue;  // exact: nowhere on a logarithmic axis
-        band.x.push_back(k);
-        band.low.push_back(std::max(shown.value - shown.half_width, 0.1 * shown.value));
-        band.middle.push_back(shown.value);
-        band.high.push_back(shown.value + shown.half_width);
+        entry["rows"].push_back(std::move(numbers));
       }
       result.json["models"].push_back(std::move(entry));
-      if (!band.x.empty()) panel.bands.push_back(std::move(band));
     }
-    if (!panel.bands.empty()) result.panels.push_back(std::move(panel));
+    result.table += common::table(lines);
   }
 
-  static std::string label(PredictionStudy::Measure measure) {
+  static std::vector<double> by_slider(const Cell& cell, std::size_t iteration) {
+    std::vector<double> means;
+    for (std::size_t i = 0; i < cell.made.front()->at("levels").front()[kBySlider].size(); ++i) {
+      std::vector<double> values;
+      for (const json* one : cell.made) values.push_back(one->at("levels")[iteration][kBySlider][i]);
+      means.push_back(common::mean_of(values).value);
+    }
+    return means;
+  }
+
+  static std::string label(Measure measure) {
     switch (measure) {
-      case PredictionStudy::Measure::kFinal:
+      case Measure::kFinal:
         return "distance of last states, mm";
-      case PredictionStudy::Measure::kPositions:
+      case Measure::kPositions:
         return "RMS error of positions, mm";
-      case PredictionStudy::Measure::kState:
+      case Measure::kState:
         return "RMS error of states (m, rad, m/s, rad/s)";
     }
     return "";
   }
 
   PredictionStudy study_;
+  int jobs_ = 1;
+  std::string seed_;
+  PredictionCases cases_;
+  std::unique_ptr<physics_pool::ThreadPool> pool_;
 };
 
 }  // namespace
@@ -342,8 +390,7 @@ Result<std::unique_ptr<Study>> read_prediction_study(yaml::Fields& fields, const
   using Measure = PredictionStudy::Measure;
   using physics_pool::Shape;
   using physics_pool::Uncertainty;
-  PredictionStudy study;
-  fields.required("title", study.title);
+  PredictionStudy study{.about = read_about(fields)};
   fields.required("models", study.models);
   fields.choice<Cases>("cases", study.cases,
                        {{"open-loop", Cases::kOpenLoop}, {"examples", Cases::kExamples}, {"random", Cases::kRandom}});

@@ -3,8 +3,6 @@
 /// Studies of prediction alone: how far Parareal is from the fine model, or from a world
 /// that the fine model does not know exactly, after each iteration.
 
-#include <array>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -30,7 +28,7 @@ struct PredictionStudy {
     kState,      ///< RMS over the sliders' whole states (m, rad, m/s, rad/s)
   };
 
-  std::string title;
+  StudyAbout about;
   std::vector<std::string> models;  ///< names that make_coarse_model takes; the first one is the thesis's
   Cases cases = Cases::kOpenLoop;
   Measure measure = Measure::kFinal;

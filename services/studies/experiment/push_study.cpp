@@ -2,14 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <filesystem>
-#include <mutex>
-#include <tuple>
+#include <optional>
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/scenarios/push.hpp"
 #include "services/common/charts/statistics.hpp"
+#include "services/common/results/results.hpp"
+#include "services/common/results/table.hpp"
+#include "services/studies/experiment/options.hpp"
 #include "services/task/config/predictor.hpp"
 #include "services/task/session/composition.hpp"
 #include "services/world/in_process/in_process_world.hpp"
@@ -17,189 +22,247 @@
 namespace jostle::studies {
 namespace {
 
+using nlohmann::json;
 using physics_pool::Scene;
 using physics_pool::Uncertainty;
+using planners::Ending;
+
+// One scene to be pushed in, with one predictor.
+struct Case {
+  std::uint64_t seed = 0;
+  PushStudy::Entry entry;
+
+  std::string name() const { return fmt::format("seed {} {} x{}", seed, entry.predictor, entry.threads); }
+};
 
 Result<Scene> scene_of(const PushStudy& study, std::uint64_t seed) {
   const physics_pool::GeneratePushOptions options{.seed = seed, .shape = study.shape, .objects = study.objects};
   return study.chapter == 6 ? physics_pool::generate_chapter6(options) : physics_pool::generate_chapter7(options);
 }
 
-Result<planners::Outcome> push(const PushStudy& study, const PushRun& run, std::stop_token stop) {
-  auto scene_result = scene_of(study, run.seed);
+Result<planners::Outcome> push(const PushStudy& study, const Case& one, std::stop_token stop) {
+  auto scene_result = scene_of(study, one.seed);
   if (!scene_result) return scene_result.error();
   const Scene& scene = *scene_result;
-  const Scene belief = physics_pool::perturb(scene, study.reality, run.seed);
+  const Scene belief = physics_pool::perturb(scene, study.reality, one.seed);
   auto truth_result = physics_pool::World::compile(scene);
   if (!truth_result) return truth_result.error();
-  const PushStudy::Entry& entry = study.entries[run.entry];
-  physics_pool::ThreadPool threads(entry.threads);
-  auto predictor_result = task::Predictor::make(entry.predictor, threads);
+  physics_pool::ThreadPool threads(one.entry.threads);
+  auto predictor_result = task::Predictor::make(one.entry.predictor, threads);
   if (!predictor_result) return predictor_result.error();
   auto run_result = task::Composition::make({.belief = belief,
                                              .belief_is_exact = study.reality == Uncertainty::kNone,
                                              .parameters = study.parameters,
-                                             .seed = run.seed},
+                                             .seed = one.seed},
                                             predictor_result->pool());
   if (!run_result) return run_result.error();
   physics_pool::ExecutionWorld world(*truth_result,
-                                     {.sigma = physics_pool::velocity_noise(study.reality), .seed = run.seed});
+                                     {.sigma = physics_pool::velocity_noise(study.reality), .seed = one.seed});
   world::SimulatedRobot robot(world);
   world::SimulatedObjects objects(world, belief);
   return run_result->perform(robot, objects, {}, stop);
 }
 
+json record_of(const Case& one, const planners::Outcome& outcome) {
+  return {{"seed", one.seed},
+          {"predictor", one.entry.predictor},
+          {"threads", one.entry.threads},
+          {"success", outcome.success},
+          {"ending", planners::to_string(outcome.ending)},
+          {"reason", outcome.reason},
+          {"actions", outcome.actions},
+          {"replans", outcome.replans},
+          {"rollouts", outcome.rollouts},
+          {"planning_seconds", outcome.planning_time.count()}};
+}
+
+json record_of(const Case& one, const std::string& error) {
+  json record = record_of(one, planners::Outcome{.ending = Ending::kBroken, .reason = error});
+  for (const char* key : {"actions", "replans", "rollouts", "planning_seconds"}) record[key] = nullptr;
+  return record;
+}
+
+bool ended_as(const json& run, Ending ending) { return run.value("ending", "") == planners::to_string(ending); }
+
 // Runs with one predictor.
 struct Cell {
   PushStudy::Entry entry;
-  std::vector<const PushRun*> runs, successes;
+  int successes = 0, timed_out = 0, broken = 0;
+  std::vector<const json*> runs;     // that came to an end, whatever it was; broken ones did not
+  std::vector<const json*> in_time;  // of these: not ended by the clock
 
-  template <class Value>
-  common::Mean over_runs(Value value) const {
-    std::vector<double> values;
-    for (const PushRun* run : runs) values.push_back(value(*run));
-    return common::mean_of(values);
+  void add(const json& run) {
+    if (ended_as(run, Ending::kBroken)) {
+      ++broken;
+      return;
+    }
+    runs.push_back(&run);
+    successes += run["success"] ? 1 : 0;
+    if (ended_as(run, Ending::kTimedOut))
+      ++timed_out;
+    else
+      in_time.push_back(&run);
   }
+
+  std::string name() const { return fmt::format("{} x{}", entry.predictor, entry.threads); }
+  common::Share share() const { return common::wilson_interval(successes, static_cast<int>(runs.size())); }
 };
 
-std::vector<Cell> cells(const PushStudy& study, const std::vector<PushRun>& runs) {
+template <class Value>
+common::Mean mean_over(const std::vector<const json*>& runs, Value value) {
+  std::vector<double> values;
+  for (const json* run : runs) values.push_back(value(*run));
+  return common::mean_of(values);
+}
+
+double planning(const json& run) { return run["planning_seconds"]; }
+double actions(const json& run) { return run["actions"]; }
+double per_plan(const json& run) { return planning(run) / (run["replans"].get<double>() + 1); }
+
+std::vector<Cell> cells(const std::vector<PushStudy::Entry>& entries, const json& runs) {
   std::vector<Cell> result;
-  for (const PushStudy::Entry& entry : study.entries) result.push_back({.entry = entry});
-  for (const PushRun& run : runs) {
-    result[run.entry].runs.push_back(&run);
-    if (run.outcome.success) result[run.entry].successes.push_back(&run);
-  }
-  return result;
-}
-
-planners::Ending ending_of(const PushRun& run) {
-  return run.error.empty() ? run.outcome.ending : planners::Ending::kBroken;
-}
-double planning(const PushRun& run) { return run.outcome.planning_time.count(); }
-double actions(const PushRun& run) { return run.outcome.actions; }
-double per_plan(const PushRun& run) { return planning(run) / std::max(run.outcome.replans + 1, 1); }
-
-StudyReport report(const PushStudy& study, const std::vector<PushRun>& runs) {
-  StudyReport result;
-  result.table = fmt::format("{}\n\n{:<28}{:<9}{:<10}{:<16}{:<14}{:<18}{:<18}{}\n", study.title, "predictor", "threads",
-                             "success", "95 % interval", "actions", "planning, s", "per plan, s", "completion, s");
-  result.json = {{"title", study.title}, {"rows", nlohmann::json::array()}, {"runs", nlohmann::json::array()}};
-  common::Panel panel{.x_label = "predictors, in the legend's order", .y_label = "task completion, s"};
-  const auto text = [](const common::Mean& mean, int digits) {
-    return fmt::format("{:.{}f} ± {:.{}f}", mean.value, digits, mean.half_width, digits);
-  };
-  const double step = study.parameters.controller.mpc.step_duration;
-  const auto completion = [step](const PushRun& run) { return planning(run) + step * actions(run); };
-  for (const Cell& cell : cells(study, runs)) {
-    const common::Share share =
-        common::wilson_interval(static_cast<int>(cell.successes.size()), static_cast<int>(cell.runs.size()));
-    const common::Mean taken = cell.over_runs(actions), planned = cell.over_runs(planning),
-                       each = cell.over_runs(per_plan);
-    const common::Mean whole = cell.over_runs(completion);
-    result.table += fmt::format("{:<28}{:<9}{:<10}{:<16}{:<14}{:<18}{:<18}{}\n", cell.entry.predictor,
-                                cell.entry.threads, fmt::format("{}/{}", share.successes, share.runs),
-                                fmt::format("{:.2f} to {:.2f}", share.low, share.high), text(taken, 1),
-                                text(planned, 2), text(each, 3), text(whole, 1));
-    result.json["rows"].push_back({{"predictor", cell.entry.predictor},
-                                   {"threads", cell.entry.threads},
-                                   {"successes", share.successes},
-                                   {"runs", share.runs},
-                                   {"interval", {share.low, share.high}},
-                                   {"actions", taken.value},
-                                   {"planning_seconds", planned.value},
-                                   {"planning_seconds_half_width", planned.half_width},
-                                   {"seconds_per_plan", each.value},
-                                   {"seconds_per_plan_half_width", each.half_width},
-                                   {"completion_seconds", whole.value}});
-    // A level each: predictors have an order in the legend, not on an axis.
-    const auto place = static_cast<double>(panel.bands.size());
-    const double low = whole.value - whole.half_width, high = whole.value + whole.half_width;
-    panel.bands.push_back({.name = fmt::format("{} x{}", cell.entry.predictor, cell.entry.threads),
-                           .x = {place + 0.1, place + 0.9},
-                           .low = {low, low},
-                           .middle = {whole.value, whole.value},
-                           .high = {high, high}});
-  }
-  result.table +=
-      "\nMeans over all runs, failed ones too, with 95 % intervals of the mean. Completion: planning, and an\n"
-      "action's duration for each action. The world stands still while its planner thinks.\n";
-  if (!study.remark.empty()) result.table += study.remark + "\n";
-  result.panels = {panel};
-  for (const PushRun& run : runs) {
-    result.broken = result.broken || !run.error.empty();
-    result.json["runs"].push_back({{"seed", run.seed},
-                                   {"predictor", study.entries[run.entry].predictor},
-                                   {"threads", study.entries[run.entry].threads},
-                                   {"success", run.outcome.success},
-                                   {"ending", planners::to_string(ending_of(run))},
-                                   {"reason", run.error.empty() ? run.outcome.reason : run.error},
-                                   {"actions", run.outcome.actions},
-                                   {"rollouts", run.outcome.rollouts},
-                                   {"planning_seconds", planning(run)}});
+  for (const PushStudy::Entry& entry : entries) {
+    result.push_back({.entry = entry});
+    for (const json& run : runs) {
+      if (run["predictor"] == entry.predictor && run["threads"] == entry.threads) result.back().add(run);
+    }
   }
   return result;
 }
 
 class PushStudyRunner final : public Study {
  public:
-  explicit PushStudyRunner(PushStudy study) : study_(std::move(study)) {}
+  explicit PushStudyRunner(PushStudy study) : Study(study.about), study_(std::move(study)) {}
 
-  const std::string& title() const override { return study_.title; }
+  void add_options(CLI::App& app) override {
+    seeds_.add_to(app, study_.first_seed, study_.last_seed);
+    add_timeout_option(app, timeout_);
+  }
 
-  Result<StudyReport> run(const StudyOptions& options) override {
-    if (!options.levels.empty() || !options.controllers.empty() || options.samples || !options.models.empty()) {
-      return Error{Code::kInvalidArgument,
-                   "this study has no --levels, --controllers, --samples or --models, wanted "
-                   "--seeds, --timeout"};
+  Result<std::vector<std::string>> prepare() override {
+    if (auto ok = seeds_.apply(study_.first_seed, study_.last_seed); !ok) return ok.error();
+    if (timeout_) study_.parameters.limits.timeout = std::chrono::milliseconds(std::llround(*timeout_ * 1e3));
+    std::vector<std::string> names;
+    cases_.clear();
+    for (std::uint64_t seed = study_.first_seed; seed <= study_.last_seed; ++seed) {
+      for (const PushStudy::Entry& entry : study_.entries) {
+        cases_.push_back({.seed = seed, .entry = entry});
+        names.push_back(cases_.back().name());
+      }
     }
-    PushStudy study = study_;
-    if (options.seeds) std::tie(study.first_seed, study.last_seed) = *options.seeds;
-    if (options.timeout) study.parameters.limits.timeout = *options.timeout;
-    const std::size_t total = study.entries.size() * (study.last_seed - study.first_seed + 1);
-    std::size_t done = 0;
-    const auto runs = run_study(study, options, [&](const PushRun& run) {
-      options.on_progress(fmt::format(
-          "[{:>3}/{}] seed {:<4} {:<28} x{} {:<7} {} ({} actions, {:.2f} s of planning)", ++done, total, run.seed,
-          study.entries[run.entry].predictor, study.entries[run.entry].threads, run.outcome.success ? "ok" : "FAILED",
-          run.error.empty() ? run.outcome.reason : run.error, run.outcome.actions, planning(run)));
-    });
-    if (options.stop.stop_requested()) return Error{Code::kCancelled, "experiment: stopped on request"};
-    return report(study, runs);
+    return names;
+  }
+
+  json settings() const override { return {{"timeout_s", timeout_ ? json(*timeout_) : json()}}; }
+
+  Result<json> run_case(std::size_t index, std::stop_token stop) override {
+    auto outcome_result = push(study_, cases_[index], std::move(stop));
+    if (!outcome_result) return outcome_result.error();
+    return record_of(cases_[index], *outcome_result);
+  }
+
+  std::string news_of(const json& run) const override {
+    return fmt::format("{}, {} ({} actions, {:.2f} s of planning)", run["ending"].get<std::string>(),
+                       run["reason"].get<std::string>(), run["actions"].get<int>(), planning(run));
+  }
+
+  StudyReport report(const std::vector<json>& records) const override {
+    json runs = json::array();  // with those that broke
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      if (records[i].is_null()) continue;
+      runs.push_back(records[i].contains("error") ? record_of(cases_[i], records[i]["error"].get<std::string>())
+                                                  : records[i]);
+    }
+    const std::vector<Cell> all = cells(study_.entries, runs);
+    json rows = json::array();
+    for (const Cell& cell : all) rows.push_back(row_of(cell));
+    return {.table = table_of(all), .json = {{"title", title()}, {"rows", std::move(rows)}, {"runs", std::move(runs)}}};
+  }
+
+  bool has_figure() const override { return true; }
+
+  std::vector<common::Panel> figure(const json& report) const override {
+    common::Panel panel{.y_label = "task completion, s"};
+    for (const Cell& cell : cells(study_.entries, report.at("runs"))) {
+      const common::Mean mean = completion(cell);
+      if (mean.count == 0) continue;
+      panel.bands.push_back({.name = cell.name(),
+                             .x = {static_cast<double>(panel.names.size())},
+                             .low = {mean.value - mean.half_width},
+                             .middle = {mean.value},
+                             .high = {mean.value + mean.half_width}});
+      panel.names.push_back(cell.name());
+    }
+    if (panel.bands.empty()) return {};
+    return {panel};
   }
 
  private:
+  // Planning, and an action's duration for each action. A run that the clock ended would have taken longer.
+  common::Mean completion(const Cell& cell) const {
+    const double step = study_.parameters.controller.mpc.step_duration;
+    return mean_over(cell.in_time, [step](const json& run) { return planning(run) + step * actions(run); });
+  }
+
+  std::string table_of(const std::vector<Cell>& all) const {
+    std::vector<std::vector<std::string>> ends{
+        {"predictor", "threads", "success", "95 % interval", "timed out", "actions"}};
+    std::vector<std::vector<std::string>> times{
+        {"predictor", "threads", "planning, s", "per plan, s", "completion, s"}};
+    int broken = 0;
+    for (const Cell& cell : all) {
+      const common::Share share = cell.share();
+      broken += cell.broken;
+      const std::string threads = std::to_string(cell.entry.threads);
+      ends.push_back({cell.entry.predictor, threads, fmt::format("{}/{}", share.successes, share.runs),
+                      common::interval_text(share.low, share.high), std::to_string(cell.timed_out),
+                      to_text(mean_over(cell.runs, actions), 1)});
+      times.push_back({cell.entry.predictor, threads, to_text(mean_over(cell.runs, planning), 2),
+                       to_text(mean_over(cell.in_time, per_plan), 3), to_text(completion(cell), 1)});
+    }
+    std::string text = fmt::format("{}\n\n{}\n{}", title(), common::table(ends), common::table(times));
+    text +=
+        "\nMeans, and 95 % intervals of the mean where there are two runs or more. Actions and planning: over\n"
+        "all runs, with what those that failed or timed out have spent. Per plan and completion: over the\n"
+        "runs that did not time out. Completion is planning, and an action's duration for each action: the\n"
+        "world stands still while its planner thinks.\n";
+    if (broken > 0) text += fmt::format("Parts of the system failed in {} more runs, which count nowhere.\n", broken);
+    if (!study_.remark.empty()) text += study_.remark + "\n";
+    return text;
+  }
+
+  json row_of(const Cell& cell) const {
+    const common::Share share = cell.share();
+    json row{{"predictor", cell.entry.predictor},
+             {"threads", cell.entry.threads},
+             {"successes", share.successes},
+             {"runs", share.runs},
+             {"timed_out", cell.timed_out},
+             {"broken", cell.broken},
+             {"interval", {common::number_or_null(share.low), common::number_or_null(share.high)}}};
+    const std::pair<const char*, common::Mean> means[] = {{"actions", mean_over(cell.runs, actions)},
+                                                          {"planning_seconds", mean_over(cell.runs, planning)},
+                                                          {"seconds_per_plan", mean_over(cell.in_time, per_plan)},
+                                                          {"completion_seconds", completion(cell)}};
+    for (const auto& [key, mean] : means) {
+      row[key] = common::number_or_null(mean.value);
+      row[std::string(key) + "_half_width"] = common::number_or_null(mean.half_width);
+    }
+    return row;
+  }
+
   PushStudy study_;
+  SeedsOption seeds_;
+  std::optional<double> timeout_;  // s
+  std::vector<Case> cases_;
 };
 
 }  // namespace
 
-std::vector<PushRun> run_study(const PushStudy& study, const StudyOptions& options,
-                               const std::function<void(const PushRun&)>& on_run) {
-  std::vector<PushRun> runs;
-  for (std::uint64_t seed = study.first_seed; seed <= study.last_seed; ++seed) {
-    for (std::size_t entry = 0; entry < study.entries.size(); ++entry) runs.push_back({.seed = seed, .entry = entry});
-  }
-  std::mutex reporting;
-  constexpr int kOneAtATime = 1;  // its threads have the machine to themselves
-  run_side_by_side(runs.size(), kOneAtATime, options.stop, [&](std::size_t i) {
-    PushRun& run = runs[i];
-    auto outcome_result = push(study, run, options.stop);
-    if (outcome_result) {
-      run.outcome = std::move(outcome_result).value();
-    } else {
-      run.error = outcome_result.error().message;
-    }
-    const std::lock_guard lock(reporting);
-    on_run(run);
-  });
-  return runs;
-}
-
 Result<std::unique_ptr<Study>> read_push_study(yaml::Fields& fields, const std::string& origin) {
   using physics_pool::Shape;
-  PushStudy study;
+  PushStudy study{.about = read_about(fields)};
   std::string parameters;
-  fields.required("title", study.title);
   fields.required("parameters", parameters);
   fields.optional("chapter", study.chapter);
   fields.optional("objects", study.objects);

@@ -4,7 +4,7 @@
 /// predictor after the other.
 
 #include <cstdint>
-#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -25,7 +25,7 @@ struct PushStudy {
     int threads = 1;
   };
 
-  std::string title;
+  StudyAbout about;
   task::Parameters parameters;
   int chapter = 6;  ///< 6 or 7: scenes of generate_chapter6 or generate_chapter7
   physics_pool::Shape shape = physics_pool::Shape::kCylinder;
@@ -37,20 +37,9 @@ struct PushStudy {
   std::string remark;  ///< printed below the table
 };
 
-/// One scene, planned and pushed once.
-struct PushRun {
-  std::uint64_t seed = 0;
-  std::size_t entry = 0;
-  std::string error;  ///< not empty if the system itself failed
-  planners::Outcome outcome;
-};
-
-/// Runs every combination, one at a time unless told otherwise, because times are measured.
-/// Scenes are in the outer loop, so that what slows the machine slows all predictors.
-std::vector<PushRun> run_study(const PushStudy& study, const StudyOptions& options,
-                               const std::function<void(const PushRun&)>& on_run);
-
-/// Reads a study whose file says `study: push`; `origin` is that file.
+/// Reads a study whose file says `study: push`; `origin` is that file. A case is one scene pushed with one predictor.
+/// They run one at a time, because times are measured; scenes are in the outer loop, so that what slows the
+/// machine slows all predictors.
 Result<std::unique_ptr<Study>> read_push_study(yaml::Fields& fields, const std::string& origin);
 
 }  // namespace jostle::studies

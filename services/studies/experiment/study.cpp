@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
+#include <cstdio>
 #include <filesystem>
-#include <thread>
+#include <optional>
 
-#include "idl/text/yaml_fields.hpp"
 #include "services/common/process/files.hpp"
 #include "services/studies/experiment/grasping_study.hpp"
 #include "services/studies/experiment/prediction_study.hpp"
@@ -16,11 +15,21 @@
 
 namespace jostle::studies {
 
+std::vector<common::Panel> Study::figure(const nlohmann::json&) const { return {}; }
+
+StudyAbout read_about(yaml::Fields& fields) {
+  StudyAbout about;
+  fields.required("title", about.title);
+  fields.optional("purpose", about.purpose);
+  fields.optional("takes", about.takes);
+  return about;
+}
+
 Result<std::unique_ptr<Study>> load_study(const std::string& name) {
   const auto file = common::data_file("experiments/" + name + ".yaml");
   auto text_result = common::read_text(file);
   if (!text_result) {
-    return Error{Code::kNotFound, fmt::format("experiment: got '{}', wanted one of `jostle experiment "
+    return Error{Code::kNotFound, fmt::format("study: got '{}', wanted one of `jostle experiment "
                                               "list` ({})",
                                               name, text_result.error().message)};
   }
@@ -60,27 +69,31 @@ Result<std::map<std::string, std::string>> study_files(const std::string& name) 
   return files;
 }
 
-std::vector<std::pair<std::string, std::string>> list_studies() {
-  std::vector<std::pair<std::string, std::string>> studies;
+std::vector<std::pair<std::string, std::unique_ptr<Study>>> load_studies() {
+  std::vector<std::pair<std::string, std::unique_ptr<Study>>> studies;
   std::error_code problem;
   for (const auto& entry : std::filesystem::directory_iterator(common::data_file("experiments"), problem)) {
     if (entry.path().extension() != ".yaml") continue;
     const std::string name = entry.path().stem().string();
-    if (auto study_result = load_study(name)) studies.emplace_back(name, (*study_result)->title());
+    if (auto study_result = load_study(name)) studies.emplace_back(name, std::move(study_result).value());
   }
-  std::ranges::sort(studies);
+  std::ranges::sort(studies, {}, [](const auto& study) { return study.first; });
   return studies;
 }
 
-void run_side_by_side(std::size_t count, int at_a_time, std::stop_token stop,
-                      const std::function<void(std::size_t)>& job) {
-  std::atomic<std::size_t> next = 0;
-  std::vector<std::jthread> threads;
-  for (int i = 0; i < std::max(at_a_time, 1); ++i) {
-    threads.emplace_back([&] {
-      for (std::size_t mine = next++; mine < count && !stop.stop_requested(); mine = next++) job(mine);
-    });
+Result<std::pair<std::uint64_t, std::uint64_t>> parse_seeds(const std::string& text) {
+  unsigned long long first = 0, last = 0;
+  char rest = 0;
+  const int found = std::sscanf(text.c_str(), "%llu-%llu%c", &first, &last, &rest);
+  if (found == 1) last = first;
+  // One that begins with a sign would be a huge number.
+  const bool is_number = !text.empty() && text.front() >= '0' && text.front() <= '9';
+  if (!is_number || (found != 1 && found != 2) || last < first ||
+      (found == 1 && text.find_first_not_of("0123456789") != std::string::npos)) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("--seeds: got '{}', wanted a number or a range such as 1-10", text)};
   }
+  return std::pair<std::uint64_t, std::uint64_t>(first, last);
 }
 
 }  // namespace jostle::studies

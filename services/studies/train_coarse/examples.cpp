@@ -57,16 +57,15 @@ void add(Errors& errors, const DataOrigin& origin, const Transition& transition,
   errors.deepest = std::max(errors.deepest, depth);
 }
 
-double share(double part, std::size_t whole) { return whole > 0 ? part / static_cast<double>(whole) : 0.0; }
+double share(double part, std::size_t whole) { return whole > 0 ? part / static_cast<double>(whole) : common::kNone; }
 
 Accuracy summary(int sliders, const Errors& errors) {
   Accuracy row{.sliders = sliders, .pushed = errors.position.size()};
   row.all_mean = share(errors.all, errors.everything);
   row.all_rms = std::sqrt(share(errors.all_squares, errors.everything));
   row.penetrating = share(static_cast<double>(errors.penetrating), errors.transitions);
-  row.deepest = errors.deepest;
+  row.deepest = errors.penetrating > 0 ? errors.deepest : common::kNone;
   row.mean_depth = share(errors.depths, errors.penetrating);
-  if (errors.position.empty()) return row;
   row.mean_way = share(errors.way, row.pushed);
   double sum = 0.0;
   for (const double error : errors.position) sum += error;
@@ -151,12 +150,16 @@ std::string accuracy_table(const std::vector<Accuracy>& rows) {
       "way mm", "mean", "median", "90 %", "median", "90 %", "mean", "rms", "pen. %", "mean", "deepest");
   text += fmt::format("{:>7} {:>8} {:>7} | {:^20} | {:^13} | {:^13} | {:^21}\n", "", "", "", "error of pushed, mm",
                       "angle, deg", "of all, mm", "penetration, mm");
+  const auto number = [](double value, int digits, int width) {
+    return fmt::format("{:>{}}", common::number_text(value, digits), width);
+  };
   for (const Accuracy& row : rows) {
-    text += fmt::format("{:>7} {:>8} {:>7.1f} | {:>6.2f} {:>6.2f} {:>6.2f} | ", row.sliders, row.pushed,
-                        1e3 * row.mean_way, 1e3 * row.mean, 1e3 * row.median, 1e3 * row.p90);
-    text += fmt::format("{:>6.2f} {:>6.2f} | {:>6.2f} {:>6.2f} | {:>6.1f} {:>6.2f} {:>7.2f}\n",
-                        kDegrees * row.angle_median, kDegrees * row.angle_p90, 1e3 * row.all_mean, 1e3 * row.all_rms,
-                        1e2 * row.penetrating, 1e3 * row.mean_depth, 1e3 * row.deepest);
+    text += fmt::format("{:>7} {:>8} {} | {} {} {} | ", row.sliders, row.pushed, number(1e3 * row.mean_way, 1, 7),
+                        number(1e3 * row.mean, 2, 6), number(1e3 * row.median, 2, 6), number(1e3 * row.p90, 2, 6));
+    text += fmt::format("{} {} | {} {} | {} {} {}\n", number(kDegrees * row.angle_median, 2, 6),
+                        number(kDegrees * row.angle_p90, 2, 6), number(1e3 * row.all_mean, 2, 6),
+                        number(1e3 * row.all_rms, 2, 6), number(1e2 * row.penetrating, 1, 6),
+                        number(1e3 * row.mean_depth, 2, 6), number(1e3 * row.deepest, 2, 7));
   }
   return text;
 }

@@ -31,7 +31,7 @@ bool is_part(Part part, double held_out, std::size_t transition);
 
 Examples examples_of(const TransitionFile& data, Part part, double held_out, const physics_pool::Parking& parking);
 
-/// Errors of one-step predictions over the sliders that F moves by 1 mm or more.
+/// Errors of one-step predictions over the sliders that F moves by 1 mm or more; common::kNone where there are none.
 struct Accuracy {
   int sliders = 0;                             ///< in the scene
   std::size_t pushed = 0;                      ///< sliders that F moved

@@ -8,6 +8,7 @@
 #include "physics_pool/local/thread_pool.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
+#include "services/common/results/results.hpp"
 #include "services/common/terminal/progress_line.hpp"
 #include "services/pool/client/remote_pool.hpp"
 #include "services/studies/train_coarse/collect.hpp"

@@ -123,6 +123,23 @@ TEST_P(EitherController, ReportsATimeoutOfThePlannerAsAnOutcome) {
   EXPECT_THAT(robot.executed, testing::IsEmpty());
 }
 
+TEST_P(EitherController, CountsWhatAPlanSpentThatRanOutOfTime) {
+  planner.error = Error{Code::kDeadline, "too late"};
+  planner.rollouts_before_error = 33;
+  const Outcome result = outcome();
+  EXPECT_EQ(result.rollouts, 33u);
+  EXPECT_GT(result.planning_time.count(), 0.0);
+  EXPECT_EQ(result.plan_time.count(), 0.0);
+  EXPECT_EQ(result.iterations, 0);
+}
+
+TEST_P(EitherController, TimeThatRunsOutIsNotRolloutsThatAreSpent) {
+  planner.error = Error{Code::kDeadline, "too late"};
+  planner.rollouts_before_error = 33;
+  setup.limits.rollouts = 25;
+  EXPECT_THAT(outcome().reason, HasSubstr("timeout after"));
+}
+
 TEST_P(EitherController, ReportsATimeoutBeforeAnActionAsAnOutcome) {
   setup.limits.timeout = std::chrono::milliseconds(0);
   const Outcome result = outcome();

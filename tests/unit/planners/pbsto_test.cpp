@@ -225,6 +225,17 @@ TEST_F(PbstoTest, BeginsNoIterationOnceItsRolloutsAreSpent) {
   EXPECT_EQ(plan.rollouts, 25u);
 }
 
+TEST_F(PbstoTest, CountsTheRolloutsThatItAskedForAlsoIfItFails) {
+  options.rollouts = 8;
+  pool.fail_at = 2;  // the third batch, which is the second noisy one
+  std::uint64_t asked_for = 0;
+  Problem p = problem(50);
+  p.rollouts_asked_for = &asked_for;
+  Pbsto sut(pool, options);
+  EXPECT_FALSE(sut.plan(p, kNever));
+  EXPECT_EQ(asked_for, 1u + 8 + 8);
+}
+
 TEST_F(PbstoTest, GreedyPicksTheCheapestSample) {
   const Problem p = problem(1);
   const Plan plan = planned(p);

@@ -48,16 +48,68 @@ class Path {
   std::string before_;
 };
 
-TEST(Plot, DrawsAPng) {
+TEST(Plot, DrawsWhatTheEndingSays) {
   const tests::TempFolder folder;
-  const auto png = folder.path() / "new folder" / "it's a plot.png";
-  const auto drawn = plot(png, "Made-up curves, 100 % {of} $them", made_up_panels());
-  ASSERT_TRUE(drawn) << drawn.error().message;
-  const std::string bytes = tests::contents(png);
-  ASSERT_GT(bytes.size(), 10'000u);
-  EXPECT_EQ(bytes.substr(1, 3), "PNG");
-  EXPECT_EQ(word(bytes, 16), 2 * 700u + 300u);  // two panels and the legend
-  EXPECT_EQ(word(bytes, 20), 600u);
+  for (const auto& [ending, beginning] : {std::pair{".png", "\x89PNG"}, std::pair{".PNG", "\x89PNG"},
+                                          std::pair{".svg", "<?xml"}, std::pair{".pdf", "%PDF"}}) {
+    const auto picture = folder.path() / "new folder" / (std::string("it's a plot") + ending);
+    const auto drawn = plot(picture, "Made-up curves, 100 % {of} $them", made_up_panels());
+    ASSERT_TRUE(drawn) << drawn.error().message;
+    const std::string bytes = tests::contents(picture);
+    EXPECT_GT(bytes.size(), 5'000u) << ending;
+    EXPECT_TRUE(bytes.starts_with(beginning)) << ending;
+  }
+}
+
+TEST(Plot, IsAsWideAsItsPanelsAndItsLegend) {
+  const tests::TempFolder folder;
+  const auto width = [&](const std::vector<Panel>& panels) {
+    const auto drawn = plot(folder.path() / "p.png", "", panels);
+    EXPECT_TRUE(drawn) << drawn.error().message;
+    return word(tests::contents(folder.path() / "p.png"), 16);
+  };
+  std::vector<Panel> panels = made_up_panels();
+  const unsigned two = width(panels);
+  panels[0].bands[0].name += std::string(20, 'x');
+  EXPECT_GT(width(panels), two + 150);
+  panels.pop_back();
+  EXPECT_LT(width(panels), two);
+}
+
+TEST(Plot, OtherEndingsAreRefusedBeforeAnythingIsDrawn) {
+  EXPECT_TRUE(check_picture("a/b.svg"));
+  for (const char* name : {"/tmp/never.jpg", "/tmp/never", "/tmp/png"}) {
+    const auto drawn = plot(name, "", made_up_panels());
+    ASSERT_FALSE(drawn);
+    EXPECT_EQ(drawn.error().code, Code::kInvalidArgument);
+    EXPECT_EQ(drawn.error().message,
+              std::string("picture: got '") + name + "', wanted a name that ends in .png, .svg or .pdf");
+  }
+}
+
+// What stands in an SVG can be read.
+std::string svg_of(const Panel& panel) {
+  const tests::TempFolder folder;
+  const auto drawn = plot(folder.path() / "p.svg", "title", {panel});
+  EXPECT_TRUE(drawn) << drawn.error().message;
+  return tests::contents(folder.path() / "p.svg");
+}
+
+TEST(Plot, CallsPlacesByTheirNames) {
+  Panel panel{.y_label = "s", .names = {"coarse,kinematic x1", "it's fine"}};
+  for (double i : {0.0, 1.0}) {
+    panel.bands.push_back({.name = "band", .x = {i}, .low = {1.0}, .middle = {2.0}, .high = {3.0}});
+  }
+  const std::string svg = svg_of(panel);
+  EXPECT_THAT(svg, testing::HasSubstr("kinematic x1"));
+  EXPECT_THAT(svg, testing::HasSubstr("fine"));
+  EXPECT_THAT(svg, testing::Not(testing::HasSubstr(">band<")));  // no legend
+}
+
+TEST(Plot, GivesZerosOfALogarithmicAxisAPlaceAndAName) {
+  Panel panel{.x_label = "iteration", .y_label = "mm", .log_y = true, .counts_x = true, .zero = "exact"};
+  panel.bands.push_back({.name = "band", .x = {0, 1, 2}, .low = {8, -1, 0}, .middle = {10, 1, 0}, .high = {12, 3, 0}});
+  EXPECT_THAT(svg_of(panel), testing::HasSubstr("exact"));
 }
 
 TEST(Plot, SaysWhatIsMissingWithoutGnuplot) {
@@ -68,12 +120,21 @@ TEST(Plot, SaysWhatIsMissingWithoutGnuplot) {
   EXPECT_THAT(drawn.error().message, testing::HasSubstr("gnuplot-nox"));
 }
 
-TEST(Plot, PassesGnuplotsWordsOn) {
+TEST(Plot, NamesAFileThatCannotBeWritten) {
   const tests::TempFolder folder;
-  const auto drawn = plot(folder.path(), "a folder is no file", made_up_panels());
+  std::filesystem::create_directory(folder.path() / "folder.png");
+  const auto drawn = plot(folder.path() / "folder.png", "a folder is no file", made_up_panels());
   ASSERT_FALSE(drawn);
   EXPECT_EQ(drawn.error().code, Code::kIo);
-  EXPECT_THAT(drawn.error().message, testing::HasSubstr(folder.path().string()));
+  EXPECT_THAT(drawn.error().message, testing::HasSubstr("folder.png"));
+}
+
+TEST(RunGnuplot, PassesGnuplotsWordsOn) {
+  const tests::TempFolder folder;
+  const auto drawn = run_gnuplot(folder.path() / "p.png", 100, 100, "plot nonsense\n");
+  ASSERT_FALSE(drawn);
+  EXPECT_THAT(drawn.error().message, testing::HasSubstr("undefined variable: nonsense"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "p.png"));
 }
 
 TEST(Plot, RefusesNothingAndBandsThatDisagree) {

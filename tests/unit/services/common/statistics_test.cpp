@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <numeric>
 
 namespace jostle::common {
@@ -55,7 +56,36 @@ TEST(WilsonInterval, StaysBetweenNoneAndAll) {
   }
 }
 
-TEST(WilsonInterval, OfNoRunsSaysNothing) { EXPECT_EQ(wilson_interval(0, 0).runs, 0); }
+TEST(Statistics, OfNothingThereIsNoNumber) {
+  EXPECT_TRUE(std::isnan(quantile({}, 0.5)));
+  EXPECT_TRUE(std::isnan(median_interval({}).low));
+  EXPECT_TRUE(std::isnan(mean_of({}).value));
+  EXPECT_EQ(mean_of({}).count, 0);
+  EXPECT_EQ(wilson_interval(0, 0).runs, 0);
+  EXPECT_TRUE(std::isnan(wilson_interval(0, 0).high));
+}
+
+TEST(MeanOf, IsTheMeanWithItsInterval) {
+  const Mean mean = mean_of({1.0, 2.0, 3.0});
+  EXPECT_EQ(mean.count, 3);
+  EXPECT_DOUBLE_EQ(mean.value, 2.0);
+  EXPECT_NEAR(mean.half_width, 1.96 / std::sqrt(3.0), 1e-12);
+}
+
+TEST(MeanOf, HasNoIntervalOfOneValue) {
+  EXPECT_DOUBLE_EQ(mean_of({4.0}).value, 4.0);
+  EXPECT_TRUE(std::isnan(mean_of({4.0}).half_width));
+}
+
+TEST(ToText, ShowsNoNumberWhereThereIsNone) {
+  EXPECT_EQ(to_text(mean_of({1.0, 2.0, 3.0}), 1), "2.0 ± 1.1");
+  EXPECT_EQ(to_text(mean_of({4.0}), 2), "4.00");
+  EXPECT_EQ(to_text(mean_of({}), 2), "-");
+  EXPECT_EQ(number_text(kNone, 1), "-");
+  EXPECT_EQ(number_text(HUGE_VAL, 1), "-");
+  EXPECT_EQ(interval_text(0.25, 0.5), "0.25 to 0.50");
+  EXPECT_EQ(interval_text(kNone, kNone), "-");
+}
 
 }  // namespace
 }  // namespace jostle::common

@@ -97,14 +97,33 @@ TEST(CheapPhysics, ComparesEveryLeverWithFullPhysics) {
   EXPECT_THAT(to_text(*results), HasSubstr("candidates/s"));
 }
 
+TEST(CheapPhysics, ShowsNoNumbersOfWhatWasNotMeasured) {
+  physics_pool::ThreadPool pool(1);
+  const CheapPhysicsOptions options{.levers = {{"plain", {.rollouts = 1, .step_duration = 0.5}}},
+                                    .parts = {"speed"},
+                                    .sizes = {2},
+                                    .worlds = 1,
+                                    .repeats = 1,
+                                    .iterations = 1};
+  const auto results = measure_cheap_physics(pool, options, {});
+  ASSERT_TRUE(results) << results.error().message;
+  const nlohmann::json lever = to_json(*results)["levers"][0];
+  for (const char* key : {"rank_correlation", "pose_error_median", "pose_error_90", "success_rate", "plan_time_ratio"})
+    EXPECT_TRUE(lever[key].is_null()) << key;
+  EXPECT_TRUE(lever["success_interval"][0].is_null());
+  EXPECT_THAT(to_text(*results), testing::ContainsRegex("plain +2 +1[.]00 +- +-, -\n"));
+  EXPECT_THAT(to_text(*results), testing::Not(HasSubstr("grasps")));
+}
+
 TEST(CheapPhysics, EndsWhenAskedTo) {
   physics_pool::ThreadPool pool(1);
   CheapPhysicsOptions options{.levers = usual_levers({})};
   std::stop_source stop;
   stop.request_stop();
   const auto results = measure_cheap_physics(pool, options, stop.get_token());
-  ASSERT_FALSE(results);
-  EXPECT_EQ(results.error().code, Code::kCancelled);
+  ASSERT_TRUE(results);
+  EXPECT_FALSE(results->complete);
+  EXPECT_TRUE(results->levers.empty() || results->levers[0].ratios.empty());
 }
 
 }  // namespace

@@ -70,6 +70,43 @@ TEST(Compare, PassesAnErrorOn) {
   EXPECT_EQ(result.error().message, "gone");
 }
 
+TEST(Compare, KeepsThePairsThatWereCompleteWhenItIsStopped) {
+  std::stop_source source;
+  int runs = 0;
+  const Side a{"a", [&]() -> Result<Sample> {
+                 if (++runs == 4) source.request_stop();  // in the third pair that counts
+                 if (source.stop_requested()) return Error{Code::kCancelled, "batch: cancelled by its caller"};
+                 return Sample{3.0, kHash};
+               }};
+  auto result = compare(a, constant("b", 2.0), {.repeats = 9, .stop = source.get_token()});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->a.size(), 2u);
+  EXPECT_EQ(result->b.size(), 2u);
+  EXPECT_THAT(to_text(*result), ::testing::HasSubstr("2 of 9 repeats"));
+  EXPECT_EQ(to_json({*result})[0]["repeats"], 2);
+  EXPECT_EQ(to_json({*result})[0]["repeats_wanted"], 9);
+}
+
+TEST(Compare, TellsOfEveryRun) {
+  int told = 0;
+  const Turns turns{.repeats = 2, .on_run = [&] { ++told; }};
+  ASSERT_TRUE(compare(constant("a", 1.0), constant("b", 1.0), turns));
+  EXPECT_EQ(told, 6);
+  EXPECT_EQ(turns.runs(), 6);
+}
+
+TEST(Compare, OneRepeatHasNoRange) {
+  const auto result = compare(constant("a", 3.0), constant("b", 2.0), {.repeats = 1});
+  EXPECT_THAT(to_text(*result), ::testing::HasSubstr("ratio 1.500  (1 repeat"));
+}
+
+TEST(ToText, HasADashWhereThereIsNoNumber) {
+  auto result = compare(constant("a", 3.0), constant("b", 2.0), {.repeats = 1});
+  result->details = {{"used_again_after_s", common::kNone}};
+  EXPECT_THAT(to_text(*result), ::testing::ContainsRegex("used_again_after_s +-"));
+  EXPECT_TRUE(to_json({*result})[0]["details"]["used_again_after_s"].is_null());
+}
+
 TEST(Compare, EndsOnAStopRequest) {
   std::stop_source source;
   source.request_stop();

@@ -1,10 +1,12 @@
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "idl/text/yaml_fields.hpp"
-#include "services/common/charts/statistics.hpp"
 #include "services/studies/experiment/prediction_study.hpp"
 #include "services/studies/experiment/push_study.hpp"
 #include "services/studies/experiment/study.hpp"
+#include "tests/support/studies.hpp"
 
 namespace jostle::tests {
 namespace {
@@ -22,10 +24,6 @@ Result<std::unique_ptr<Study>> prediction(const std::string& text) {
   });
 }
 
-StudyOptions quietly(int jobs = 2) {
-  return {.jobs = jobs, .on_progress = [](const std::string&) {}};
-}
-
 constexpr const char* kSmall = R"(
 title: small
 models: [kinematic, planar]
@@ -36,9 +34,13 @@ angles_deg: [0]
 integrator: euler
 )";
 
-TEST(ListStudies, EveryFileThatNamesAStudyLoads) {
+TEST(LoadStudies, EveryFileThatNamesAStudyLoadsAndSaysWhatItIs) {
   std::vector<std::string> names;
-  for (const auto& [name, title] : list_studies()) names.push_back(name);
+  for (const auto& [name, study] : load_studies()) {
+    names.push_back(name);
+    EXPECT_FALSE(study->about().purpose.empty()) << name;
+    EXPECT_FALSE(study->about().takes.empty()) << name;
+  }
   EXPECT_THAT(names, ::testing::IsSupersetOf({"fig-3.5", "fig-6.5", "fig-6.6", "fig-6.7", "fig-7.2", "fig-7.3",
                                               "fig-7.4", "fig-7.5", "table-6.1"}));
 }
@@ -48,13 +50,18 @@ TEST(LoadStudy, UnknownNameAndMereParametersAreToldApart) {
   EXPECT_THAT(load_study("pushing").error().message, HasSubstr("study: missing"));
 }
 
+TEST(ParseSeeds, TakesARangeOrOne) {
+  EXPECT_EQ(*parse_seeds("1-10"), (std::pair<std::uint64_t, std::uint64_t>(1, 10)));
+  EXPECT_EQ(*parse_seeds("7"), (std::pair<std::uint64_t, std::uint64_t>(7, 7)));
+  for (const char* text : {"", "-1", "10-1", "1-", "1-2x", "x", "7x", " 1"}) EXPECT_FALSE(parse_seeds(text)) << text;
+}
+
 TEST(PredictionStudy, LastIterationIsExactAndRowsAreWhatReadersExpect) {
   auto study_result = prediction(kSmall);
   ASSERT_TRUE(study_result) << study_result.error().message;
-  auto report_result = (*study_result)->run(quietly());
-  ASSERT_TRUE(report_result) << report_result.error().message;
+  const StudyEnd end = finished(**study_result);
 
-  const auto& json = report_result->json;
+  const auto& json = end.report.json;
   EXPECT_EQ(json["model"], "kinematic");
   ASSERT_EQ(json["rows"].size(), 5u);
   EXPECT_GT(json["rows"][0]["trans_mm"], 0.0);
@@ -62,12 +69,35 @@ TEST(PredictionStudy, LastIterationIsExactAndRowsAreWhatReadersExpect) {
   EXPECT_EQ(json["rows"][4]["trans_mm"], 0.0);
   EXPECT_EQ(json["rows"][4]["rot_deg"], 0.0);
   EXPECT_EQ(json["models"].size(), 2u);
-  EXPECT_FALSE(report_result->broken);
+  EXPECT_EQ(end.broken, 0u);
 }
 
 TEST(PredictionStudy, NumbersDoNotDependOnJobs) {
   auto one = prediction(kSmall), two = prediction(kSmall);
-  EXPECT_EQ((*one)->run(quietly(1))->json, (*two)->run(quietly(2))->json);
+  set_options(**one, {"--jobs", "1"});
+  set_options(**two, {"--jobs", "2"});
+  EXPECT_EQ(finished(**one).report.json, finished(**two).report.json);
+}
+
+TEST(PredictionStudy, FigureShowsTheExactIterationAndIsMadeOfTheReport) {
+  auto study_result = prediction(kSmall);
+  const StudyEnd end = finished(**study_result);
+  const auto panels = (*study_result)->figure(end.report.json);
+  ASSERT_EQ(panels.size(), 1u);
+  EXPECT_TRUE(panels[0].counts_x);
+  EXPECT_EQ(panels[0].zero, "exact");
+  ASSERT_EQ(panels[0].bands.size(), 2u);
+  EXPECT_EQ(panels[0].bands[0].x, (std::vector<double>{0, 1, 2, 3, 4}));
+  EXPECT_EQ(panels[0].bands[0].middle[4], 0.0);
+}
+
+TEST(PredictionStudy, OnePredictionHasNoInterval) {
+  auto study_result = prediction(kSmall);
+  set_options(**study_result, {"--samples", "1"});
+  const StudyEnd end = finished(**study_result);
+  EXPECT_TRUE(end.report.json["rows"][0]["trans_mm_half_width"].is_null());
+  EXPECT_THAT(end.report.table, ::testing::Not(HasSubstr("±")));
+  EXPECT_TRUE(std::isnan((*study_result)->figure(end.report.json)[0].bands[0].low[0]));
 }
 
 TEST(PredictionStudy, RefusesWhatItDoesNotHave) {
@@ -75,12 +105,23 @@ TEST(PredictionStudy, RefusesWhatItDoesNotHave) {
               HasSubstr("study.yaml:3: cases: got 'dice', wanted one of: open-loop, examples, random"));
   EXPECT_THAT(prediction("title: x\nmodels: []\n").error().message, HasSubstr("got 0 models"));
   auto study_result = prediction(kSmall);
-  StudyOptions options = quietly();
-  options.levels = {"low"};
-  EXPECT_THAT((*study_result)->run(options).error().message, HasSubstr("no --levels"));
-  options = quietly();
-  options.models = {"astrology"};
-  EXPECT_THAT((*study_result)->run(options).error().message, HasSubstr("got 'astrology'"));
+  EXPECT_THROW(set_options(**study_result, {"--levels", "low"}), CLI::ParseError);
+  set_options(**study_result, {"--models", "astrology"});
+  EXPECT_THAT(refusal(**study_result), HasSubstr("got 'astrology'"));
+}
+
+TEST(TimingStudy, OneRunHasTimesAndNoIntervals) {
+  auto study_result = load_study("fig-6.6");
+  ASSERT_TRUE(study_result) << study_result.error().message;
+  set_options(**study_result, {"--samples", "1"});
+  const StudyEnd end = finished(**study_result);
+  EXPECT_THAT(end.report.table, ::testing::Not(HasSubstr("±")));
+  ASSERT_EQ(end.report.json["rows"].size(), 5u);
+  for (const auto& row : end.report.json["rows"]) {
+    EXPECT_GT(row["ms"], 0.0);
+    EXPECT_TRUE(row["ms_half_width"].is_null());
+  }
+  EXPECT_EQ((*study_result)->figure(end.report.json)[0].bands[0].x, (std::vector<double>{1, 2, 3, 4}));
 }
 
 TEST(PredictionCases, AreTheSameEveryTimeAndFeasible) {
@@ -100,13 +141,6 @@ TEST(PredictionCases, AreTheSameEveryTimeAndFeasible) {
       EXPECT_LE(std::hypot(u[0], u[1]), study.speed + 1e-12);
     }
   }
-}
-
-TEST(MeanOf, IsTheMeanWithItsInterval) {
-  const common::Mean mean = common::mean_of({1.0, 2.0, 3.0});
-  EXPECT_DOUBLE_EQ(mean.value, 2.0);
-  EXPECT_NEAR(mean.half_width, 1.96 / std::sqrt(3.0), 1e-12);
-  EXPECT_EQ(common::mean_of({}).half_width, 0.0);
 }
 
 }  // namespace

@@ -18,16 +18,10 @@ constexpr const char* kExample =
     "  jostle bag export experiment --csv -o tables      a table per topic\n"
     "  jostle bag export experiment --json --topic '/robot/*' --from 10 --to 12 | jq .message.q\n"
     "A bag is a folder, or one of its files (.mcap, .db3); those of rosbag2 are read, too. docs/bags.md says more.\n"
-    "Exit codes: 0 done, 1 verified and damaged, or nothing to save or export, 2 wrong arguments or a bag that cannot\n"
-    "be opened, 3 output cannot be written, 130 interrupted.";
+    "Exit codes: 0 done, 1 verified and damaged, something was lost, or nothing to save or export, 2 wrong arguments\n"
+    "or a bag that cannot be opened, 3 output cannot be written, 130 interrupted.";
 
 }  // namespace
-
-int jostle::bags::fail(const Error& error, int otherwise) {
-  fmt::print(stderr, "jostle bag: {}\n", error.message);
-  if (error.code == Code::kCancelled) return common::kExitInterrupted;
-  return error.code == Code::kNotFound ? common::kExitUsage : otherwise;
-}
 
 int main(int argc, char** argv) {
   using namespace jostle;

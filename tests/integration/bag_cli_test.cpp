@@ -17,6 +17,7 @@ using namespace std::chrono_literals;
 using bags::BagOptions;
 using bags::BagReader;
 using bags::BagWriter;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
@@ -150,8 +151,9 @@ TEST_P(BagCli, RecoverSavesWhatLiesBeforeAndBehindDamage) {
   }
   ASSERT_EQ(run({"verify", path}), 1);
   const std::string saved = folder.path() / "saved";
-  ASSERT_EQ(run({"recover", path, "--output", saved}), 0) << program->err();
-  EXPECT_THAT(program->out(), HasSubstr("damaged: " + file().string() + ": "));
+  ASSERT_EQ(run({"recover", path, "--output", saved}), 1) << program->err();
+  EXPECT_THAT(program->out(), HasSubstr("; lost: "));
+  EXPECT_THAT(program->out(), AllOf(HasSubstr("damaged: "), HasSubstr(file().string() + ": ")));
   ASSERT_EQ(run({"verify", saved}), 0) << program->err();
   expect_noise(saved, kNoises / 3);
   EXPECT_TRUE(taken(BagReader::open(saved))->info().notes.contains("lost"));
@@ -168,8 +170,8 @@ TEST_P(BagCli, RecoverSavesWhatAFileThatWasCutOffHas) {
   }
   fs::resize_file(file(), size / 4096 * 4096);
   const std::string saved = folder.path() / "saved";
-  ASSERT_EQ(run({"recover", path, "-o", saved}), 0) << program->err();
-  EXPECT_THAT(program->out(), HasSubstr("damaged: " + file().string() + ": "));
+  ASSERT_EQ(run({"recover", path, "-o", saved}), 1) << program->err();
+  EXPECT_THAT(program->out(), AllOf(HasSubstr("damaged: "), HasSubstr(file().string() + ": ")));
   ASSERT_EQ(run({"verify", saved}), 0) << program->err();
   expect_noise(saved, kNoises / 3);
 }
@@ -207,6 +209,47 @@ TEST_P(BagCli, ExportsJsonLineByLine) {
   EXPECT_EQ(run({"export", path, "--json", "-o", file_name}), 1) << "it must not overwrite";
   EXPECT_EQ(run({"export", path, "--json", "--topic", "/no/such"}), 2);
   EXPECT_EQ(run({"export", path}), 2);
+}
+
+TEST_P(BagCli, ExportsWhatDecodesAndCountsWhatDoesNot) {
+  {
+    const auto writer = taken(BagWriter::create(path, {.storage = GetParam()}));
+    const int text = taken(writer->add_topic(string_topic("/robot/status")));
+    const int other = taken(writer->add_topic(string_topic("/robot_status")));
+    taken(writer->write(text, {.log_time = kBegin, .data = noise(3, 1)}));
+    taken(writer->write(text, {.log_time = kBegin + 1, .data = cdr_of("good")}));
+    taken(writer->write(other, {.log_time = kBegin + 2, .data = cdr_of("good, too")}));
+    taken(writer->close());
+  }
+  EXPECT_EQ(run({"export", path, "--json"}), 1);
+  EXPECT_EQ(std::ranges::count(program->out(), '\n'), 2);
+  EXPECT_THAT(program->err(), HasSubstr("1 message lost: /robot/status: message of log time"));
+  // Two topics that want one name of a file.
+  const std::string tables = folder.path() / "tables";
+  EXPECT_EQ(run({"export", path, "--csv", "-o", tables}), 1) << program->err();
+  EXPECT_THAT(contents(tables + "/robot_status.csv"), HasSubstr(",good\r\n"));
+  EXPECT_THAT(contents(tables + "/robot_status_2.csv"), HasSubstr(",\"good, too\"\r\n"));
+  EXPECT_EQ(run({"verify", path}), 1);
+  EXPECT_THAT(program->err(), HasSubstr("cannot be decoded"));
+  EXPECT_THAT(program->out(), HasSubstr("not ok: 3 messages"));
+}
+
+TEST_P(BagCli, ExportRefusesTimesThatAreNoneAndFoldersThatHoldSomethingElse) {
+  write_bag();
+  const auto expect_refused = [&](std::vector<std::string> arguments, int code, const std::string& words) {
+    arguments.insert(arguments.begin(), {"export", path, "--json", "--topic", "/robot/text"});
+    EXPECT_EQ(run(arguments), code) << words;
+    EXPECT_THAT(program->err(), HasSubstr(words));
+    EXPECT_THAT(program->out(), IsEmpty());
+  };
+  expect_refused({"--from", "5", "--to", "4"}, 2, "--to: got 4 s, wanted at least the 5 s of --from");
+  expect_refused({"--from", "11"}, 2, "--from: got 11 s, wanted at most 10 s, where the last message is");
+  expect_refused({"--to", "nan"}, 2, "--to: got nan s, wanted a number");
+  EXPECT_EQ(run({"export", path, "--csv", "-o", path}), 1);
+  EXPECT_THAT(program->err(), HasSubstr("wanted a new or an empty folder"));
+  EXPECT_FALSE(fs::exists(path + "/robot_text.csv"));
+  EXPECT_EQ(run({"export", path, "--json", "--topic", "/robot/text", "-o", "/dev/null"}), 0) << program->err();
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
 TEST_P(BagCli, LeavesNothingBehindWhenInterrupted) {

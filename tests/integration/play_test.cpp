@@ -308,7 +308,7 @@ TEST_F(Play, RemapsGlobsAndLeavesCommandsOut) {
   start({"--exclude", "/a/y", "--wait-for-subscribers=1"});
   EXPECT_EQ(player->wait(kPatience), 0) << player->err();
   EXPECT_TRUE(soon(kPatience, [&] { return b->count() == 1; }));
-  EXPECT_THAT(player->err(), HasSubstr("left out, as whoever hears it acts: /robot/command"));
+  EXPECT_THAT(player->err(), HasSubstr("not played, because a robot would obey: /robot/command"));
   EXPECT_EQ(command.count(), 0u);
   EXPECT_EQ(command.matched(), 0);
   EXPECT_EQ(y->count(), 0u);
@@ -393,6 +393,24 @@ TEST_F(Play, AnMcapOfAnotherProfileGetsAClearError) {
   const std::string message = record(5, "\1\0"s + std::string(20, '\0') + "data");
   const std::string tail = record(15, std::string(4, '\0')) + record(2, std::string(20, '\0')) + magic;
   expect_refused(folder.write("old.mcap", head + schema + channel + message + tail), {"old.mcap"});
+}
+
+// A message of before /clock was there, and nothing for decades.
+TEST_F(Play, AGapOfYearsIsSaidAndCanBeSkipped) {
+  const auto writer = taken(bags::BagWriter::create(bag, {}));
+  const int topic = taken(writer->add_topic(string_topic("/a")));
+  taken(writer->write(topic, {.log_time = 0, .data = cdr_of("early")}));
+  taken(writer->write(topic, {.log_time = 1'700'000'000'000'000'000, .data = cdr_of("late")}));
+  taken(writer->close());
+  start({});
+  EXPECT_TRUE(player->says("a gap: the next message, of 2023-11-14 22:13:20 UTC, comes in 53.9 years", kPatience))
+      << player->err();
+  EXPECT_THAT(player->err(), HasSubstr("--start 1700000000"));
+  player->signal(SIGINT);
+  EXPECT_EQ(player->wait(kPatience), 130);
+  start({"--start", "1700000000"});
+  EXPECT_EQ(player->wait(kPatience), 0) << player->err();
+  EXPECT_THAT(player->err(), HasSubstr("1 messages of 1 topics"));
 }
 
 TEST_F(Play, ATruncatedBagGetsAClearError) {

@@ -12,6 +12,7 @@
 
 #include "idl/types/result.hpp"
 #include "services/bags/format/bag_writer.hpp"
+#include "services/bags/format/findings.hpp"
 #include "services/bags/format/message.hpp"
 
 namespace jostle::bags {
@@ -21,6 +22,11 @@ struct TopicInfo {
   std::uint64_t messages = 0;
 };
 
+struct AttachmentInfo {
+  std::string name, media_type;
+  std::uint64_t bytes = 0;
+};
+
 struct BagInfo {
   std::filesystem::path path;  ///< as opened
   std::string storage;         ///< "mcap" or "sqlite3"
@@ -28,11 +34,15 @@ struct BagInfo {
   std::uint64_t bytes = 0;  ///< size of the files
   Time start = 0, end = 0;  ///< log times of the first and the last message
   std::uint64_t messages = 0;
-  std::vector<TopicInfo> topics;  ///< in the order of their names
+  std::vector<TopicInfo> topics;  ///< in the order of their names; those of one name differ in type or definition
   std::map<std::string, Note> notes;
+  std::vector<NamedNote> earlier_notes;  ///< other notes under names that `notes` has
+  std::vector<AttachmentInfo> attachments;
 };
 
-/// Reads what BagWriter or rosbag2 wrote.
+/// Reads what BagWriter or rosbag2 wrote. Messages, topics and times are judged one by one: one that cannot be given
+/// out is counted among findings(), and the rest comes. What a checksum or an index covers is believed whole or not at
+/// all: there reading ends with an error, whose remedy steps over it.
 ///
 /// Threads  one.
 class BagReader {
@@ -55,6 +65,10 @@ class BagReader {
   /// Returns the next message; nothing at the end. Messages of equal time come in the order they were written.
   /// Errors   kInvalidArgument, kIo: damaged here; says file and byte
   virtual Result<std::optional<Message>> next() = 0;
+
+  /// Returns what was found so far that is not as it should be: parts that are not given out, each with the reason,
+  /// and parts that are all the same. Reading may find more.
+  virtual std::vector<Finding> findings() const = 0;
 
   /// Returns the newest message of a topic at or before `time`, if there is one. Does not move next().
   virtual Result<std::optional<Message>> last_at(int topic, Time time) = 0;

@@ -29,7 +29,7 @@ class FolderWriter final : public BagWriter {
 
   Result<int> add_topic(const Topic& topic) override {
     if (failure_) return *failure_;
-    if (std::ranges::any_of(topics_, [&](const OpenTopic& other) { return other.topic.name == topic.name; })) {
+    if (std::ranges::any_of(topics_, [&](const OpenTopic& other) { return other.topic.is_same_as(topic); })) {
       return Error{Code::kInvalidArgument, fmt::format("{}: {}: got the topic twice", folder_.string(), topic.name)};
     }
     if (auto ok = file_->add_topic(topic); !ok) return ok.error();
@@ -77,6 +77,16 @@ class FolderWriter final : public BagWriter {
     if (known != notes_.end() && known->second == note) return;
     changed_notes_[name] = note;
     notes_[name] = std::move(note);
+  }
+
+  Result<void> attach(const Attachment& attachment) override {
+    if (failure_) return *failure_;
+    return file_->attach(attachment);
+  }
+
+  Result<void> add_note(const NamedNote& note) override {
+    if (failure_) return *failure_;
+    return file_->add_note(note);
   }
 
   Result<void> close() override {

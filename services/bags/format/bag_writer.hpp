@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "idl/types/result.hpp"
 #include "services/bags/format/message.hpp"
@@ -16,6 +17,10 @@ namespace jostle::bags {
 
 /// A Note is text by name: what a bag says of itself beyond its messages.
 using Note = std::map<std::string, std::string>;
+using NamedNote = std::pair<std::string, Note>;
+
+/// The note that counts lost samples by topic. It is written over and over, and of several the last one counts.
+inline constexpr const char* kLostNote = "lost";
 
 struct BagOptions {
   enum class Storage {
@@ -53,6 +58,11 @@ class BagWriter {
 
   /// Sets a note, which the next flush() or close() stores under `name`, as do all files that follow.
   virtual void set_note(const std::string& name, Note note) = 0;
+
+  /// Writes a file within the bag, or a note that stays beside others of its name.
+  /// Error kInvalidArgument: databases have no room for it.
+  virtual Result<void> attach(const Attachment& attachment) = 0;
+  virtual Result<void> add_note(const NamedNote& note) = 0;
 
   /// Writes index, statistics, notes and metadata.yaml.
   virtual Result<void> close() = 0;

@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -19,9 +20,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-enum class Basic { kBool, kU8, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF32, kF64, kString, kMessage };
+enum class Basic { kBool, kU8, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF32, kF64, kString, kWideString, kMessage };
 
-constexpr std::array<std::pair<std::string_view, Basic>, 14> kBasics{{{"bool", Basic::kBool},
+constexpr std::array<std::pair<std::string_view, Basic>, 15> kBasics{{{"bool", Basic::kBool},
                                                                       {"byte", Basic::kU8},
                                                                       {"char", Basic::kU8},
                                                                       {"uint8", Basic::kU8},
@@ -34,7 +35,8 @@ constexpr std::array<std::pair<std::string_view, Basic>, 14> kBasics{{{"bool", B
                                                                       {"int64", Basic::kI64},
                                                                       {"float32", Basic::kF32},
                                                                       {"float64", Basic::kF64},
-                                                                      {"string", Basic::kString}}};
+                                                                      {"string", Basic::kString},
+                                                                      {"wstring", Basic::kWideString}}};
 
 // The bytes that a value takes; for strings and messages, the least.
 constexpr std::size_t size_of(Basic basic) {
@@ -68,10 +70,25 @@ struct MessageType {
   std::vector<Field> fields;
 };
 
-// pkg/msg/Name and pkg/Name are the same.
+// pkg/Name for a type's ROS 2 name; another name stays what it is.
 std::string short_name(const std::string& type) {
-  const std::size_t at = type.find("/msg/");
-  return at == std::string::npos ? type : type.substr(0, at) + type.substr(at + 4);
+  const std::string name = ros_type_name(type);
+  const std::size_t at = name.find("/msg/");
+  return at == std::string::npos ? name : name.substr(0, at) + name.substr(at + 4);
+}
+
+// Appends a character as UTF-8; what is none, such as half of a pair, as the sign for that.
+void append_utf8(std::string& to, std::uint32_t character) {
+  constexpr std::uint32_t kNone = 0xFFFD;
+  if (character > 0x10FFFF || (character >= 0xD800 && character < 0xE000)) character = kNone;
+  if (character < 0x80) {
+    to += static_cast<char>(character);
+    return;
+  }
+  const int more = character < 0x800 ? 1 : character < 0x10000 ? 2 : 3;  // bytes behind the first
+  constexpr std::array<unsigned, 4> kFirst{0, 0xC0, 0xE0, 0xF0};
+  to += static_cast<char>(kFirst.at(static_cast<std::size_t>(more)) | character >> (6 * more));
+  for (int i = more - 1; i >= 0; --i) to += static_cast<char>(0x80 | (character >> (6 * i) & 0x3F));
 }
 
 // A line of a .msg file up to a comment. A '#' in a default value of text is part of it,
@@ -87,6 +104,7 @@ std::vector<std::string> words_of(const std::string& line) {
 
 struct Decoder::Types {
   std::vector<MessageType> types;  // the first is the whole
+  bool has_wide_strings = false;
 
   Error malformed(const std::string& type, int line, const std::string& what) const {
     return {Code::kInvalidArgument, fmt::format("definition of {}: line {}: {}", type, line, what)};
@@ -124,6 +142,7 @@ struct Decoder::Types {
         }
         auto field_result = parse_field(type, types[part].name, line.words[0], line.words[1], line.number);
         if (!field_result) return field_result.error();
+        has_wide_strings = has_wide_strings || field_result->basic == Basic::kWideString;
         types[part].fields.push_back(std::move(*field_result));
       }
     }
@@ -149,7 +168,9 @@ struct Decoder::Types {
       }
       type.resize(open);
     }
-    if (type.starts_with("string<=")) type = "string";
+    for (const char* text : {"string", "wstring"}) {
+      if (type.starts_with(std::string(text) + "<=")) type = text;
+    }
     for (const auto& [basic_name, basic] : kBasics) {
       if (type == basic_name) {
         field.basic = basic;
@@ -202,13 +223,14 @@ namespace {
 // Takes values off CDR. The first thing that is missing ends it; everything after it is empty.
 class CdrReader {
  public:
-  CdrReader(std::span<const std::byte> data, bool swaps, const std::vector<MessageType>& types)
-      : data_(data), swaps_(swaps), types_(types) {}
+  // `wide`: bytes of a character of a wide string.
+  CdrReader(std::span<const std::byte> data, bool swaps, const std::vector<MessageType>& types, std::size_t wide)
+      : data_(data), swaps_(swaps), types_(types), wide_(wide) {}
 
   Json message(std::size_t type) {
     Json object = Json::object();
     const auto& fields = types_[type].fields;
-    if (fields.empty()) take(1);  // rosidl gives empty messages a byte
+    if (fields.empty()) take(std::min<std::size_t>(1, left()));  // rosidl gives empty messages a byte, others none
     for (const Field& field : fields) {
       if (!problem_.empty()) break;
       const std::size_t path_size = path_.size();
@@ -286,10 +308,36 @@ class CdrReader {
         return number<double>();
       case Basic::kString:
         return text();
+      case Basic::kWideString:
+        return wide_text();
       case Basic::kMessage:
         return message(field.message);
     }
     return {};
+  }
+  std::string wide_text() {
+    const auto count = number<std::uint32_t>();
+    if (count > left() / wide_) {
+      fail(fmt::format("got a length of {}, wanted at most {}, for which there are bytes", count, left() / wide_));
+      return {};
+    }
+    std::string text;
+    std::uint32_t high = 0;  // first half of a pair
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::uint32_t unit = wide_ == 2 ? number<std::uint16_t>() : number<std::uint32_t>();
+      if (unit > 0x10FFFF) fail(fmt::format("got character {:#x}, wanted one of Unicode", unit));
+      const bool ends_pair = high != 0 && unit >= 0xDC00 && unit < 0xE000;
+      if (high != 0 && !ends_pair) append_utf8(text, high);
+      if (ends_pair) {
+        append_utf8(text, 0x10000 + ((high - 0xD800) << 10) + (unit - 0xDC00));
+      } else if (unit < 0xD800 || unit >= 0xDC00) {
+        append_utf8(text, unit);
+      }
+      high = unit >= 0xD800 && unit < 0xDC00 ? unit : 0;
+    }
+    if (high != 0) append_utf8(text, high);
+    if (!text.empty() && text.back() == '\0') text.pop_back();  // with a zero at the end, as some write it
+    return text;
   }
   std::string text() {
     const auto size = number<std::uint32_t>();
@@ -304,6 +352,7 @@ class CdrReader {
   std::size_t at_ = 0;
   const bool swaps_;
   const std::vector<MessageType>& types_;
+  const std::size_t wide_;
   std::string path_, problem_;
 };
 
@@ -331,14 +380,38 @@ Result<Json> Decoder::decode(std::span<const std::byte> cdr) const {
                  fmt::format("{}: byte 0: got encapsulation {:04x}, wanted 0000 or 0001 (plain CDR)", name, kind)};
   }
   const bool is_little = kind == 1;
-  CdrReader reader(cdr.subspan(4), is_little != (std::endian::native == std::endian::little), types_->types);
-  Json object = reader.message(0);
-  if (!reader.problem().empty()) return Error{Code::kInvalidArgument, fmt::format("{}: {}", name, reader.problem())};
-  // Writers may fill up to a multiple of their alignment.
-  if (reader.left() >= 8) {
-    return Error{Code::kInvalidArgument, fmt::format("{}: got {} bytes more than the type has", name, reader.left())};
+  const bool swaps = is_little != (std::endian::native == std::endian::little);
+  const auto decode_with = [&](std::size_t wide, std::size_t most_left) -> Result<Json> {
+    CdrReader reader(cdr.subspan(4), swaps, types_->types, wide);
+    Json object = reader.message(0);
+    if (!reader.problem().empty()) return Error{Code::kInvalidArgument, fmt::format("{}: {}", name, reader.problem())};
+    if (reader.left() > most_left) {
+      return Error{Code::kInvalidArgument, fmt::format("{}: got {} bytes more than the type has", name, reader.left())};
+    }
+    return object;
+  };
+  // Writers may fill up to a multiple of their alignment: with characters of a wrong width more would be left.
+  constexpr std::size_t kFill = 7, kLeastFill = 3;
+  if (types_->has_wide_strings) {
+    for (const std::size_t wide : {2, 4}) {
+      if (auto object_result = decode_with(wide, kLeastFill)) return object_result;
+    }
   }
-  return object;
+  return decode_with(2, kFill);
+}
+
+std::string ros_type_name(const std::string& type) {
+  static const std::regex on_the_wire(R"((\w+)::msg::dds_::(\w+)_)"), in_short(R"((\w+)/(\w+))");
+  std::smatch match;
+  if (std::regex_match(type, match, on_the_wire) || std::regex_match(type, match, in_short)) {
+    return match.str(1) + "/msg/" + match.str(2);
+  }
+  return type;
+}
+
+std::string ros_topic_name(const std::string& topic) {
+  if (topic.starts_with("rt/")) return topic.substr(2);
+  return topic.starts_with('/') || topic.empty() ? topic : fmt::format("/{}", topic);
 }
 
 }  // namespace jostle::bags

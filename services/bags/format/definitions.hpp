@@ -23,6 +23,13 @@ std::optional<std::string> definition_of(const std::string& type);
 /// recorder in rosbag2's storage, which bring no definitions. Nothing if no field was appended.
 std::optional<std::string> earlier_definition_of(const std::string& type);
 
+/// Returns the ROS 2 name of a type that is written in another way: pkg/Name or pkg::msg::dds_::Name_ for
+/// pkg/msg/Name. Another text stays what it is.
+std::string ros_type_name(const std::string& type);
+
+/// Returns the ROS 2 name of a topic that is written in another way: rt/name or name for /name.
+std::string ros_topic_name(const std::string& topic);
+
 /// Returns all types that have a definition, sorted.
 std::vector<std::string> known_types();
 
@@ -45,8 +52,9 @@ class Decoder {
   ~Decoder();
 
   /// Decodes CDR with its four bytes (XCDR1, of either byte order) into an object with fields in their
-  /// order. Numbers that are not finite stay what they are; dump() makes null of them.
-  /// Error kInvalidArgument: other bytes than the type has; says field, got, wanted.
+  /// order. Characters of wide strings may have two bytes or four: middlewares differ. Numbers that are not finite stay
+  /// what they are; dump() makes null of them. Error kInvalidArgument: other bytes than the type has; says field, got,
+  /// wanted.
   Result<nlohmann::ordered_json> decode(std::span<const std::byte> cdr) const;
 
  private:

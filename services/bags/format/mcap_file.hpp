@@ -14,6 +14,9 @@ inline constexpr const char* kMessageEncoding = "cdr";
 inline constexpr const char* kSchemaEncoding = "ros2msg";
 inline constexpr const char* kQosKey = "offered_qos_profiles";
 
+/// What the header of our own files says wrote them begins with this.
+inline constexpr const char* kOurLibrary = "jostle ";
+
 /// A Metadata record of this name stands in front of a chunk that repeats earlier files.
 inline constexpr const char* kRepeatedNote = "jostle.repeated";
 

@@ -175,6 +175,33 @@ void append(Bytes& out, const MetadataIndex& index) {
   });
 }
 
+void append_attachment(Bytes& out, const AttachmentHead& head, View data) {
+  Appender to(out);
+  to.record(Op::kAttachment, [&] {
+    const std::size_t from = out.size();
+    to.number(head.log_time);
+    to.number(head.create_time);
+    to.text(head.name);
+    to.text(head.media_type);
+    to.number(std::uint64_t{data.size()});
+    to.bytes(data);
+    to.number(crc32_of(View(out).subspan(from)));
+  });
+}
+
+void append(Bytes& out, const AttachmentIndex& index) {
+  Appender to(out);
+  to.record(Op::kAttachmentIndex, [&] {
+    to.number(index.offset);
+    to.number(index.length);
+    to.number(index.head.log_time);
+    to.number(index.head.create_time);
+    to.number(index.head.size);
+    to.text(index.head.name);
+    to.text(index.head.media_type);
+  });
+}
+
 void append(Bytes& out, const SummaryOffset& offset) {
   Appender to(out);
   to.record(Op::kSummaryOffset, [&] {
@@ -291,6 +318,39 @@ std::optional<MetadataIndex> parse_metadata_index(View body) {
   index.length = from.number<std::uint64_t>();
   index.name = from.text();
   return if_ok(from, std::move(index));
+}
+
+std::optional<AttachmentHead> parse_attachment(View body) {
+  Parser from(body);
+  AttachmentHead head;
+  head.log_time = from.number<std::uint64_t>();
+  head.create_time = from.number<std::uint64_t>();
+  head.name = from.text();
+  head.media_type = from.text();
+  head.size = from.number<std::uint64_t>();
+  return if_ok(from, std::move(head));
+}
+
+std::optional<AttachmentIndex> parse_attachment_index(View body) {
+  Parser from(body);
+  AttachmentIndex index;
+  index.offset = from.number<std::uint64_t>();
+  index.length = from.number<std::uint64_t>();
+  index.head.log_time = from.number<std::uint64_t>();
+  index.head.create_time = from.number<std::uint64_t>();
+  index.head.size = from.number<std::uint64_t>();
+  index.head.name = from.text();
+  index.head.media_type = from.text();
+  return if_ok(from, std::move(index));
+}
+
+std::optional<SummaryOffset> parse_summary_offset(View body) {
+  Parser from(body);
+  SummaryOffset offset;
+  offset.group = static_cast<Op>(from.number<std::uint8_t>());
+  offset.start = from.number<std::uint64_t>();
+  offset.length = from.number<std::uint64_t>();
+  return if_ok(from, std::move(offset));
 }
 
 std::optional<Footer> parse_footer(View body) {

@@ -127,6 +127,7 @@ class Parser {
 struct Schema {
   std::uint16_t id = 0;
   std::string name, encoding, data;
+  bool operator==(const Schema&) const = default;
 };
 
 struct Channel {
@@ -177,6 +178,18 @@ struct MetadataIndex {
   std::string name;
 };
 
+/// An attachment but for its data.
+struct AttachmentHead {
+  std::uint64_t log_time = 0, create_time = 0;
+  std::string name, media_type;
+  std::uint64_t size = 0;  ///< bytes of the data
+};
+
+struct AttachmentIndex {
+  std::uint64_t offset = 0, length = 0;  ///< where the attachment's record is in the file
+  AttachmentHead head;
+};
+
 struct SummaryOffset {
   Op group = Op::kSchema;
   std::uint64_t start = 0, length = 0;
@@ -201,6 +214,8 @@ void append(Bytes& out, const ChunkIndex& index);
 void append(Bytes& out, const Statistics& statistics);
 void append(Bytes& out, const Metadata& metadata);
 void append(Bytes& out, const MetadataIndex& index);
+void append_attachment(Bytes& out, const AttachmentHead& head, View data);
+void append(Bytes& out, const AttachmentIndex& index);
 void append(Bytes& out, const SummaryOffset& offset);
 void append_data_end(Bytes& out, std::uint32_t crc);
 /// Appends a footer. `crc_before`: checksum of the summary in front of it; 0 for an empty one.
@@ -217,9 +232,25 @@ std::optional<ChunkIndex> parse_chunk_index(View body);
 std::optional<Statistics> parse_statistics(View body);
 std::optional<Metadata> parse_metadata(View body);
 std::optional<MetadataIndex> parse_metadata_index(View body);
+/// `body` may end after the head.
+std::optional<AttachmentHead> parse_attachment(View body);
+std::optional<AttachmentIndex> parse_attachment_index(View body);
+std::optional<SummaryOffset> parse_summary_offset(View body);
 std::optional<Footer> parse_footer(View body);
 
 /// Bytes of a chunk's body in front of its records.
 inline std::size_t chunk_head_size(std::string_view compression) { return 8 + 8 + 8 + 4 + 4 + compression.size() + 8; }
+
+/// Bytes of an attachment's body in front of its data; behind them comes a checksum of 4.
+inline std::size_t attachment_head_size(const AttachmentHead& head) {
+  return 8 + 8 + 4 + head.name.size() + 4 + head.media_type.size() + 8;
+}
+
+/// Messages that message indexes of so many channels and bytes tell of; nothing if that cannot be.
+inline std::optional<std::uint64_t> indexed_messages(std::uint64_t channels, std::uint64_t length) {
+  constexpr std::uint64_t kRest = kRecordHead + 2 + 4, kEntry = 16;  // of a record beside its entries
+  if (length < channels * kRest || (length - channels * kRest) % kEntry != 0) return {};
+  return (length - channels * kRest) / kEntry;
+}
 
 }  // namespace jostle::bags::mcap

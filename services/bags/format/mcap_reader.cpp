@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <queue>
+#include <set>
 #include <tuple>
 
 #include "services/bags/format/input_file.hpp"
@@ -111,7 +112,11 @@ class McapReader final : public FileReader {
     return best;
   }
 
-  Result<void> verify() override { return mcap::verify(file_, index_, options_); }
+  Result<Attachment> attachment(std::size_t index) const override {
+    return read_attachment(file_, index_.attachments.at(index));
+  }
+
+  Result<std::vector<Finding>> verify() override { return mcap::verify(file_, index_); }
 
  private:
   struct Cursor {
@@ -122,28 +127,58 @@ class McapReader final : public FileReader {
     }
   };
 
-  Result<Loaded> load(const Block& block) const {
+  Result<Loaded> load(const Block& block) {
     auto records_result = records_of(file_, block);
     if (!records_result) return records_result.error();
+    if (records_result->problem) return *records_result->problem;
+    // What a scan has found is not found again; nor is what this block had when it was loaded before.
+    const bool is_judged = index_.was_scanned || !judged_.insert(block.offset).second;
+    Findings* findings = is_judged ? nullptr : &index_.info.findings;
     Loaded loaded;
-    auto ok = walk(file_, block, *records_result, [&](Op op, View body, std::uint64_t offset) -> Result<void> {
-      if (op != Op::kMessage) return {};
-      const auto place_result = index_.place_of(file_, block, body, offset);
-      if (!place_result) return place_result.error();
-      const Time log_time = place_result->log_time;
-      if (log_time < block.start || log_time > block.end) {
-        return damaged_in(
+    Result<void> ok;
+    Definitions own;  // this block's, to be compared with the summary's
+    const auto broken = walk(records_result->bytes, [&](Op op, View body, std::uint64_t offset) {
+      if (!index_.was_scanned && (op == Op::kSchema || op == Op::kChannel)) {
+        if (auto agrees = compare(own, op, body, block, offset); !agrees && ok) ok = agrees;
+      }
+      if (op != Op::kMessage) return;
+      const auto place = index_.place_of(file_, block, body, offset, findings);
+      if (!place) return;
+      const Time log_time = place->log_time;
+      if (ok && (log_time < block.start || log_time > block.end)) {
+        ok = damaged_in(
             file_, block, offset,
             fmt::format("got log time {}, wanted one of {} to {} as the chunk says", log_time, block.start, block.end));
       }
       loaded.entries.push_back(
-          {.log_time = log_time, .offset = offset + kRecordHead, .size = body.size(), .topic = place_result->topic});
-      return {};
+          {.log_time = log_time, .offset = offset + kRecordHead, .size = body.size(), .topic = place->topic});
     });
     if (!ok) return ok.error();
+    if (broken && !options_.recover) {
+      return damaged_in(file_, block, *broken, "a record is longer than what holds it");
+    }
     std::ranges::stable_sort(loaded.entries, {}, &Entry::log_time);
-    loaded.records = std::move(*records_result);
+    loaded.records = std::move(records_result->bytes);
     return loaded;
+  }
+
+  // A chunk says again what its channels are: where it says other than the summary, files were put together, and the
+  // summary tells of one of them.
+  Result<void> compare(Definitions& own, Op op, View body, const Block& block, std::uint64_t offset) const {
+    Findings unused;
+    own.take(op, body, {block.offset, offset}, "", unused);
+    const auto channel = op == Op::kChannel ? parse_channel(body) : std::nullopt;
+    if (!channel) return {};
+    const int* said = index_.definitions.topic_in_summary(channel->id);
+    const Topic& here =
+        own.topics()[static_cast<std::size_t>(*own.topic_of(channel->id, {block.offset, offset}))].topic;
+    if (said == nullptr) return {};
+    const Topic& wanted = index_.info.topics[static_cast<std::size_t>(*said)].topic;
+    const bool is_typed = !here.type.empty() || channel->schema == 0;  // else its schema stands in an earlier chunk
+    if (is_typed ? here.is_same_as(wanted) : here.name == wanted.name) return {};
+    return damaged_in(file_, block, offset,
+                      fmt::format("channel {}: got {} ({}), wanted {} ({}) as the summary says", channel->id, here.name,
+                                  here.type, wanted.name, wanted.type));
   }
 
   static Message message_of(const Loaded& loaded, const Entry& entry) {
@@ -161,12 +196,8 @@ class McapReader final : public FileReader {
 
   // Whether a block may have messages of topics that `is_sought`.
   template <class IsSought>
-  bool may_have(const Block& block, IsSought is_sought) const {
-    if (!block.knows_channels) return true;
-    return std::ranges::any_of(block.channels, [&](const auto& channel) {
-      const auto known = index_.topics.find(channel.first);
-      return known == index_.topics.end() || is_sought(known->second);  // unknown: load() says what is wrong
-    });
+  static bool may_have(const Block& block, IsSought is_sought) {
+    return std::ranges::any_of(block.topics, [&](const auto& topic) { return is_sought(topic.first); });
   }
 
   // Loads a block for next(), unless nothing in it is wanted.
@@ -176,7 +207,7 @@ class McapReader final : public FileReader {
     auto loaded_result = load(block);
     if (!loaded_result) {
       if (!options_.recover) return loaded_result.error();
-      index_.info.damage.push_back(loaded_result.error().message);
+      index_.info.findings.lost(Part::kChunk, loaded_result.error().message, "");
       return {};
     }
     const auto& entries = loaded_result->entries;
@@ -206,6 +237,8 @@ class McapReader final : public FileReader {
   std::size_t next_block_ = 0;            // of by_start_
   std::priority_queue<Cursor> cursors_;   // the next message of every loaded block
   std::map<std::size_t, Loaded> loaded_;  // by block
+
+  std::set<std::uint64_t> judged_;  // blocks whose findings are known, by offset
 
   std::optional<std::size_t> kept_;  // block that last_at() has at hand
   Loaded kept_block_;

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// An index made of all records of an MCAP file, for want of a summary or to check one.
+/// An index made of all records of an MCAP file, for want of a summary that says all, or to check one.
 
 #include <cstdint>
 
@@ -12,12 +12,13 @@ namespace jostle::bags::mcap {
 
 enum class ScanMode {
   kRead,     ///< up to the first damage, which is the error
-  kRecover,  ///< steps over damage: FileInfo::damage says what, there is no error
+  kRecover,  ///< steps over damage: FileInfo::findings say what, there is no error
   kVerify,   ///< as kRead, with a look at what reading does not need
 };
 
-/// Finds blocks, counts and notes anew; definitions are added to those that `index` has.
-/// `end`: where the footer is, or where a file without one ends.
-Result<void> scan(const InputFile& file, std::uint64_t end, ScanMode mode, Index& index);
+/// Finds blocks, notes and attachments anew; definitions are added to those that `index` has from its summary. Notes
+/// among FileInfo::findings whatever cannot be taken. `end`: where the footer is, or where a file without one ends.
+/// `census`: takes what was met.
+Result<void> scan(const InputFile& file, std::uint64_t end, ScanMode mode, Index& index, Census& census);
 
 }  // namespace jostle::bags::mcap

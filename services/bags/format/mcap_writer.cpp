@@ -31,7 +31,7 @@ class McapWriter final : public FileWriter {
   Result<void> begin() {
     Bytes head;
     append_magic(head);
-    append_header(head, "ros2", "jostle " JOSTLE_VERSION);
+    append_header(head, "ros2", std::string(kOurLibrary) + JOSTLE_VERSION);
     return put({head}, crc32_of(head), head.size());
   }
 
@@ -40,20 +40,20 @@ class McapWriter final : public FileWriter {
       return Error{Code::kInvalidArgument, fmt::format("{}: {}: got one topic more, wanted at most {} in a file",
                                                        file_.path().string(), topic.name, channels_.size())};
     }
-    const auto [schema, is_new] = schemas_.try_emplace({topic.type, topic.definition}, schemas_.size() + 1);
+    const std::string encoding = topic.definition.empty() && !topic.has_no_fields ? "" : topic.schema;
+    const auto [schema, is_new] =
+        schemas_.try_emplace({topic.type, encoding, topic.definition}, static_cast<std::uint16_t>(schemas_.size() + 1));
     if (is_new) {
-      const Schema record{.id = schema->second,
-                          .name = topic.type,
-                          .encoding = topic.definition.empty() ? "" : kSchemaEncoding,
-                          .data = topic.definition};
+      const Schema record{.id = schema->second, .name = topic.type, .encoding = encoding, .data = topic.definition};
       append(pending_, record);
       append(schema_records_, record);
     }
-    const Channel record{.id = static_cast<std::uint16_t>(channels_.size()),
-                         .schema = schema->second,
-                         .topic = topic.name,
-                         .encoding = kMessageEncoding,
-                         .metadata = {{kQosKey, qos_text(topic.qos)}}};
+    Channel record{.id = static_cast<std::uint16_t>(channels_.size()),
+                   .schema = schema->second,
+                   .topic = topic.name,
+                   .encoding = topic.encoding,
+                   .metadata = topic.metadata};
+    record.metadata[kQosKey] = qos_text(topic.qos);
     append(pending_, record);
     append(channel_records_, record);
     channels_.emplace_back();
@@ -82,6 +82,30 @@ class McapWriter final : public FileWriter {
     if (failure_) return *failure_;
     for (const auto& [name, note] : notes) append_metadata({.name = name, .metadata = note}, pending_);
     return close_chunk();
+  }
+
+  Result<void> attach(const Attachment& attachment) override {
+    if (failure_) return *failure_;
+    const AttachmentHead head{.log_time = static_cast<std::uint64_t>(attachment.log_time),
+                              .create_time = static_cast<std::uint64_t>(attachment.create_time),
+                              .name = attachment.name,
+                              .media_type = attachment.media_type,
+                              .size = attachment.data.size()};
+    // What is pending goes first: an attachment may be larger than all else together.
+    if (auto ok = close_chunk(); !ok) return ok;
+    Bytes record;
+    append_attachment(record, head, attachment.data);
+    const std::uint64_t offset = file_.size();
+    if (auto ok = put({record}, crc32_of(record), record.size()); !ok) return ok;
+    append(attachment_records_, AttachmentIndex{.offset = offset, .length = record.size(), .head = head});
+    ++statistics_.attachments;
+    return {};
+  }
+
+  Result<void> add_note(const NamedNote& note) override {
+    if (failure_) return *failure_;
+    append_metadata({.name = note.first, .metadata = note.second}, pending_);
+    return {};
   }
 
   Result<void> end_repeated() override {
@@ -117,7 +141,8 @@ class McapWriter final : public FileWriter {
 
   // `crc`: of all pieces, which are `size` long together.
   Result<void> put(std::initializer_list<View> pieces, std::uint32_t crc, std::size_t size) {
-    const std::uint64_t room = schema_records_.size() + channel_records_.size() + index_records_.size() + kRoomForNotes;
+    const std::uint64_t room = schema_records_.size() + channel_records_.size() + index_records_.size() +
+                               attachment_records_.size() + kRoomForNotes;
     auto ok = file_.append(pieces, room);
     if (!ok) {
       failure_ = ok.error();
@@ -226,6 +251,7 @@ class McapWriter final : public FileWriter {
     add(Op::kChannel, channel_records_);
     add(Op::kStatistics, statistics_record);
     add(Op::kChunkIndex, index_records_);
+    add(Op::kAttachmentIndex, attachment_records_);
     add(Op::kMetadataIndex, metadata_records_);
     const std::uint64_t offsets_start = file_.size() + end.size();
     for (const SummaryOffset& group : groups) append(end, group);
@@ -247,9 +273,9 @@ class McapWriter final : public FileWriter {
   std::vector<std::uint16_t> in_chunk_;  // channels with messages in it
   std::uint32_t crc_ = 0;                // of the file so far
 
-  std::map<std::pair<std::string, std::string>, std::uint16_t> schemas_;       // type, definition -> id
-  std::vector<WrittenChannel> channels_;                                       // by id, which is the topic
-  Bytes schema_records_, channel_records_, index_records_, metadata_records_;  // of the summary
+  std::map<std::array<std::string, 3>, std::uint16_t> schemas_;  // type, encoding, definition -> id
+  std::vector<WrittenChannel> channels_;                         // by id, which is the topic
+  Bytes schema_records_, channel_records_, index_records_, attachment_records_, metadata_records_;  // of the summary
   Statistics statistics_;
 };
 

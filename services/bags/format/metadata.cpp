@@ -79,19 +79,30 @@ std::string metadata_text(const BagMetadata& metadata) {
   return std::string(out.c_str()) + "\n";
 }
 
-Result<ReadMetadata> read_metadata(const std::filesystem::path& folder) {
-  const std::filesystem::path file = folder / kMetadataFile;
+namespace {
+
+// Where a file lies that metadata.yaml names. Early versions wrote the bag's folder in front; and what is not in the
+// folder is not this bag's.
+std::optional<std::filesystem::path> file_in(const std::filesystem::path& folder,
+                                             const std::filesystem::path& relative) {
+  const std::filesystem::path whole = relative.lexically_normal();
+  const bool is_inside = whole.is_relative() && (whole.empty() || *whole.begin() != "..");
   std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) {
-    return Error{Code::kNotFound, fmt::format("{}: not there", file.string())};
-  }
-  auto text_result = common::read_text(file);
-  if (!text_result) return text_result.error();
+  if (is_inside && std::filesystem::exists(folder / whole, ignored)) return folder / whole;
+  if (std::filesystem::exists(folder / whole.filename(), ignored)) return folder / whole.filename();
+  if (is_inside) return folder / whole;  // opening it says that it is missing
+  return {};
+}
+
+Result<ReadMetadata> parse_metadata(const std::filesystem::path& folder, const std::filesystem::path& file,
+                                    const std::string& text) {
+  const auto wrong = [&](const std::string& what) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: {}; remedy: jostle bag recover reads the files themselves", file.string(), what)};
+  };
   try {
-    const YAML::Node root = YAML::Load(*text_result)[kRoot];
-    if (!root.IsMap()) {
-      return Error{Code::kInvalidArgument, fmt::format("{}: got no {}, wanted rosbag2's", file.string(), kRoot)};
-    }
+    const YAML::Node root = YAML::Load(text)[kRoot];
+    if (!root.IsMap()) return wrong(fmt::format("got no {}, wanted rosbag2's", kRoot));
     if (const auto compression = root["compression_format"].as<std::string>(""); !compression.empty()) {
       return Error{
           Code::kInvalidArgument,
@@ -100,22 +111,38 @@ Result<ReadMetadata> read_metadata(const std::filesystem::path& folder) {
               file.string(), compression, root["compression_mode"].as<std::string>("?"))};
     }
     ReadMetadata metadata{.storage = root["storage_identifier"].as<std::string>("")};
+    if (const YAML::Node count = root["message_count"]) metadata.messages = count.as<std::uint64_t>();
     for (const YAML::Node& path : root["relative_file_paths"]) {
-      // Early versions wrote the bag's folder in front.
-      const std::filesystem::path relative = path.as<std::string>();
-      std::filesystem::path found = folder / relative;
-      if (!std::filesystem::exists(found, ignored)) found = folder / relative.filename();
-      metadata.files.push_back(std::move(found));
+      const auto relative = path.as<std::string>();
+      auto found = file_in(folder, relative);
+      if (!found) return wrong(fmt::format("relative_file_paths: got {}, wanted a file in the folder", relative));
+      metadata.files.push_back(std::move(*found));
     }
-    if (metadata.files.empty()) {
-      return Error{Code::kInvalidArgument,
-                   fmt::format("{}: relative_file_paths: got none, wanted the files of the bag", file.string())};
-    }
+    if (metadata.files.empty()) return wrong("relative_file_paths: got none, wanted the files of the bag");
     return metadata;
   } catch (const YAML::Exception& problem) {
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}: line {}: {}", file.string(), problem.mark.line + 1, problem.msg)};
+    return wrong(fmt::format("line {}: {}", problem.mark.line + 1, problem.msg));
   }
+}
+
+}  // namespace
+
+Result<ReadMetadata> read_metadata(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / kMetadataFile;
+  std::error_code problem;
+  const auto size = std::filesystem::file_size(file, problem);
+  if (problem == std::errc::no_such_file_or_directory) {
+    return Error{Code::kNotFound, fmt::format("{}: not there", file.string())};
+  }
+  if (!problem && size == 0) {
+    return Error{
+        Code::kInvalidArgument,
+        fmt::format("{}: the file is empty, wanted rosbag2's; remedy: jostle bag recover reads the files themselves",
+                    file.string())};
+  }
+  auto text_result = common::read_text(file);
+  if (!text_result) return text_result.error();
+  return parse_metadata(folder, file, *text_result);
 }
 
 }  // namespace jostle::bags

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,10 +37,11 @@ std::string metadata_text(const BagMetadata& metadata);
 struct ReadMetadata {
   std::string storage;  ///< may be empty
   std::vector<std::filesystem::path> files;
+  std::optional<std::uint64_t> messages;  ///< in all files, as a plain reader of each counts
 };
 
 /// Errors   kNotFound         no such file
-///          kInvalidArgument  malformed, or files compressed as a whole
+///          kInvalidArgument  malformed, a file outside of the folder, or files compressed as a whole; says the remedy
 Result<ReadMetadata> read_metadata(const std::filesystem::path& folder);
 
 }  // namespace jostle::bags

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cctype>
 #include <fstream>
+#include <optional>
 
 namespace jostle::bags {
 namespace {
@@ -27,13 +29,40 @@ Error failure(const std::filesystem::path& file, sqlite3* database) {
   }
 }
 
-// As the file's head says: 16 bits from byte 16 on, big-endian, where 1 stands for 64 KiB. 0 if it says nothing.
-std::uint64_t page_size(const std::filesystem::path& file) {
+struct Pages {
+  std::uint64_t size = 0, count = 0;
+};
+
+// As the file's head says, big-endian: 16 bits from byte 16 on, where 1 stands for 64 KiB, and 32 bits from byte 28 on.
+// 0 if it says nothing.
+Pages pages_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  std::array<unsigned char, 18> head{};
-  if (!in.read(reinterpret_cast<char*>(head.data()), head.size())) return 0;
+  std::array<unsigned char, 32> head{};
+  if (!in.read(reinterpret_cast<char*>(head.data()), head.size())) return {};
   const std::uint64_t size = std::uint64_t{head[16]} << 8 | head[17];
-  return size == 1 ? 65536 : size;
+  std::uint64_t count = 0;
+  for (std::size_t i = 28; i < 32; ++i) count = count << 8 | head.at(i);
+  return {size == 1 ? 65536 : size, count};
+}
+
+// A name by which sqlite reads a file as it is, without a look at journals.
+std::string immutable_uri(const std::filesystem::path& file) {
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(file).string()) {
+    const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '/' || c == '.' || c == '_';
+    uri += is_plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return uri + "?immutable=1";
+}
+
+// Whether a journal beside a file holds what the file lacks.
+bool has_journal(const std::filesystem::path& file) {
+  for (const char* ending : {"-wal", "-journal"}) {
+    std::error_code problem;
+    const auto size = std::filesystem::file_size(file.string() + ending, problem);
+    if (!problem && size > 0) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -64,11 +93,13 @@ std::span<const std::byte> Statement::bytes(int column) const {
   return {bytes, bytes == nullptr ? 0 : static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
 }
 
-Result<Database> Database::connect(const std::filesystem::path& file, int flags) {
+Result<Database> Database::connect(const std::filesystem::path& file, int flags, bool is_whole) {
   Database database;
   database.file_ = file;
   sqlite3* raw = nullptr;
-  const int code = sqlite3_open_v2(file.c_str(), &raw, flags | SQLITE_OPEN_NOMUTEX, nullptr);
+  const std::string name = is_whole ? immutable_uri(file) : file.string();
+  const int code =
+      sqlite3_open_v2(name.c_str(), &raw, flags | SQLITE_OPEN_NOMUTEX | (is_whole ? SQLITE_OPEN_URI : 0), nullptr);
   database.database_.reset(raw);
   if (code != SQLITE_OK) return failure(file, raw);
   sqlite3_extended_result_codes(raw, 1);
@@ -76,7 +107,7 @@ Result<Database> Database::connect(const std::filesystem::path& file, int flags)
 }
 
 Result<Database> Database::create(const std::filesystem::path& file) {
-  return connect(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+  return connect(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, false);
 }
 
 Result<Database> Database::open(const std::filesystem::path& file, bool recover) {
@@ -89,14 +120,25 @@ Result<Database> Database::open(const std::filesystem::path& file, bool recover)
                  fmt::format("{}: byte 0: the file is empty, wanted a database of sqlite3", file.string())};
   }
   // sqlite would fill a page that is cut in two up with zeros, and take them for data.
-  const std::uint64_t size = std::filesystem::file_size(file, problem), page = page_size(file);
-  if (page > 0 && size % page != 0) {
+  // What lies behind the last page is no loss.
+  const std::uint64_t size = std::filesystem::file_size(file, problem);
+  const auto [page, count] = pages_of(file);
+  if (page > 0 && size % page != 0 && (count == 0 || size < count * page)) {
     return Error{Code::kInvalidArgument, fmt::format("{}: byte {}: cut off within a page of {} bytes; remedy: truncate "
                                                      "--size={} a copy of it, and jostle bag recover that",
                                                      file.string(), size, page, size / page * page)};
   }
-  for (const int flags : {SQLITE_OPEN_READONLY, SQLITE_OPEN_READWRITE}) {
-    auto database_result = connect(file, flags);
+  struct Way {
+    int flags;
+    bool is_whole;
+  };
+  // A journal that must be rolled back wants to write; without one there is nothing to wait for.
+  constexpr std::array kWays{Way{SQLITE_OPEN_READONLY, false}, Way{SQLITE_OPEN_READWRITE, false},
+                             Way{SQLITE_OPEN_READONLY, true}};
+  std::optional<Error> trouble;
+  for (const Way& way : kWays) {
+    if (way.is_whole && has_journal(file)) break;
+    auto database_result = connect(file, way.flags, way.is_whole);
     if (!database_result) return database_result;
     sqlite3* raw = database_result->database_.get();
     // What a schema holds is somebody else's: no functions of it are called.
@@ -106,12 +148,14 @@ Result<Database> Database::open(const std::filesystem::path& file, bool recover)
     if (sqlite3_exec(raw, "SELECT 1 FROM sqlite_master LIMIT 1", nullptr, nullptr, nullptr) == SQLITE_OK) {
       return database_result;
     }
-    // A journal that must be rolled back wants to write.
+    trouble = failure(file, raw);
     const int code = sqlite3_errcode(raw) & 0xFF;
-    const bool may_help = code == SQLITE_READONLY || code == SQLITE_CANTOPEN;
-    if (!may_help || flags == SQLITE_OPEN_READWRITE) return failure(file, raw);
+    if (code != SQLITE_READONLY && code != SQLITE_CANTOPEN) return *trouble;
   }
-  return Error{Code::kInternal, "unreachable"};
+  trouble->message +=
+      "; a journal beside it must be worked off first; remedy: copy both to a folder that you may "
+      "write to";
+  return *trouble;
 }
 
 Result<void> Database::run(const std::string& sql) {

@@ -38,6 +38,12 @@ class Statement {
   Result<void> run();
   void reset() { sqlite3_reset(statement_.get()); }
 
+  bool is_integer(int column) const { return sqlite3_column_type(statement_.get(), column) == SQLITE_INTEGER; }
+  /// Texts are bytes, too.
+  bool is_bytes(int column) const {
+    const int type = sqlite3_column_type(statement_.get(), column);
+    return type == SQLITE_BLOB || type == SQLITE_TEXT;
+  }
   std::int64_t number(int column) const { return sqlite3_column_int64(statement_.get(), column); }
   std::string text(int column) const;
   /// Valid until the next step.
@@ -59,7 +65,8 @@ class Database {
   /// Creates a new database, to be written.
   static Result<Database> create(const std::filesystem::path& file);
   /// Opens a database that is there. Rolls back what a killed writer has left half done, as every program
-  /// that opens it does. `recover`: also opens one whose last pages are missing,
+  /// that opens it does. One with a journal of writes (WAL) in a folder that cannot be written to is opened if that
+  /// journal has nothing that the database lacks. `recover`: also opens one whose last pages are missing,
   /// unless a page is cut in two.
   static Result<Database> open(const std::filesystem::path& file, bool recover);
 
@@ -80,7 +87,7 @@ class Database {
   struct Close {
     void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
   };
-  static Result<Database> connect(const std::filesystem::path& file, int flags);
+  static Result<Database> connect(const std::filesystem::path& file, int flags, bool is_whole);
 
   std::filesystem::path file_;
   std::unique_ptr<sqlite3, Close> database_;

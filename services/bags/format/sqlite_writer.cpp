@@ -50,13 +50,14 @@ class SqliteWriter final : public FileWriter {
     if (failure_) return *failure_;
     if (auto ok = begin_transaction(); !ok) return ok;
     auto statement_result = database_.prepare(
-        "INSERT INTO topics(id, name, type, serialization_format, offered_qos_profiles) VALUES (?, ?, ?, 'cdr', ?)");
+        "INSERT INTO topics(id, name, type, serialization_format, offered_qos_profiles) VALUES (?, ?, ?, ?, ?)");
     if (!statement_result) return statement_result.error();
     const std::string qos = qos_text(topic.qos);
     statement_result->bind(1, static_cast<std::int64_t>(open_.messages.size() + 1));
     statement_result->bind(2, topic.name);
     statement_result->bind(3, topic.type);
-    statement_result->bind(4, qos);
+    statement_result->bind(4, topic.encoding);
+    statement_result->bind(5, qos);
     if (auto ok = kept(statement_result->run()); !ok) return ok;
     open_.messages.push_back(0);
     return {};
@@ -86,6 +87,9 @@ class SqliteWriter final : public FileWriter {
     return commit();
   }
 
+  Result<void> attach(const Attachment& attachment) override { return no_room_for("attachment " + attachment.name); }
+  Result<void> add_note(const NamedNote& note) override { return no_room_for("a second note " + note.first); }
+
   Result<void> end_repeated() override { return flush({{kRepeatedRow, {{"messages", std::to_string(messages_)}}}}); }
 
   Result<void> close(const Notes& notes) override {
@@ -102,6 +106,11 @@ class SqliteWriter final : public FileWriter {
   WrittenFile written() const override { return committed_; }
 
  private:
+  Error no_room_for(const std::string& what) const {
+    return {Code::kInvalidArgument,
+            fmt::format("{}: got {}, for which databases have no room; remedy: MCAP", database_.path().string(), what)};
+  }
+
   std::uint64_t size_on_disk() const {
     std::error_code ignored;
     const auto size = std::filesystem::file_size(database_.path(), ignored);

@@ -13,6 +13,7 @@
 #include "idl/types/result.hpp"
 #include "services/bags/format/bag_reader.hpp"
 #include "services/bags/format/bag_writer.hpp"
+#include "services/bags/format/findings.hpp"
 #include "services/bags/format/message.hpp"
 
 namespace jostle::bags {
@@ -38,6 +39,11 @@ class FileWriter {
   /// `notes`: those that have changed since they were last written to this file.
   virtual Result<void> flush(const Notes& notes) = 0;
 
+  /// Writes what only some kinds of files have room for. Error kInvalidArgument: this kind has none.
+  virtual Result<void> attach(const Attachment& attachment) = 0;
+  /// Writes a note that stays beside others of its name.
+  virtual Result<void> add_note(const NamedNote& note) = 0;
+
   /// Marks everything written so far as a repetition of what earlier files hold. Called before
   /// anything else is written.
   virtual Result<void> end_repeated() = 0;
@@ -51,14 +57,16 @@ struct FileInfo {
   std::vector<TopicInfo> topics;
   Time start = 0, end = 0;  ///< log times of the first and the last message
   std::uint64_t messages = 0;
+  std::uint64_t repeated = 0;  ///< messages that earlier files have, which are left out
   Notes notes;
-  /// What was found damaged; empty unless the file was opened to be recovered.
-  std::vector<std::string> damage;
+  std::vector<NamedNote> earlier_notes;  ///< under names that a later one has, too
+  std::vector<AttachmentInfo> attachments;
+  Findings findings;  ///< grows while the file is read
 };
 
 struct OpenOptions {
   bool skip_repeated = false;  ///< leave out what repeats earlier files
-  /// Take what is readable; FileInfo::damage says what is not. next() steps over damage, too.
+  /// Take what is readable; FileInfo::findings say what is not. next() steps over damage, too.
   bool recover = false;
 };
 
@@ -72,10 +80,12 @@ class FileReader {
   virtual void seek(Time from, std::vector<bool> wanted) = 0;
   virtual Result<std::optional<Message>> next() = 0;
   virtual Result<std::optional<Message>> last_at(int topic, Time time) = 0;
+  /// `index`: into FileInfo::attachments. Error as next().
+  virtual Result<Attachment> attachment(std::size_t index) const = 0;
 
   /// Reads the whole file for what next() does not look at: checksums and counts of the
-  /// file itself. Error as next().
-  virtual Result<void> verify() = 0;
+  /// file itself, and whether it holds what it says. Error as next().
+  virtual Result<std::vector<Finding>> verify() = 0;
 };
 
 /// How a kind of file is written and opened.

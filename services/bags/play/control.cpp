@@ -12,7 +12,7 @@
 namespace jostle::bags {
 namespace {
 
-constexpr const char* kCommands = "pause, resume, toggle, step, seek:SECONDS, rate:FACTOR, loop:0, loop:1 or quit";
+constexpr const char* kCommands = "pause, resume, toggle, step, seek:SECONDS, rate:FACTOR, loop:0, loop:1, quit";
 constexpr std::array<std::string_view, 5> kPlain{"pause", "resume", "toggle", "step", "quit"};
 constexpr std::array<std::string_view, 3> kWithValue{"seek", "rate", "loop"};
 
@@ -37,7 +37,7 @@ double slower(double rate) {
 }  // namespace
 
 std::chrono::nanoseconds from_seconds(double seconds) {
-  constexpr double kMost = 1e9;  // 32 years; twice that still fits beside a time of today
+  constexpr double kMost = 4e9;  // 127 years, from 1970 to beyond today; twice that is no duration too long
   return std::chrono::nanoseconds(std::llround(std::clamp(seconds, -kMost, kMost) * 1e9));
 }
 

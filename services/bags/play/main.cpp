@@ -19,9 +19,10 @@ struct Arguments {
   std::string bag, json;
   std::vector<std::string> topics, excluded, remaps, controls;
   double start = 0.0, duration = 0.0, timeout = 30.0;  // s
+  bool verbose = false;
 };
 
-constexpr double kMostSeconds = 1e9;
+constexpr double kMostSeconds = 4e9;  // from 1970 to beyond today
 
 int exit_code(const Error& error) {
   if (error.code == Code::kCancelled) return common::kExitInterrupted;
@@ -50,16 +51,17 @@ nlohmann::json to_json(const PlayReport& report, const std::string& bag) {
           {"problem", report.problem ? report.problem->message : ""}};
 }
 
-void tell_what_is_left_out(const TopicPlan& plan, common::LiveLine& line) {
+void tell_what_is_left_out(const TopicPlan& plan, bool verbose, common::LiveLine& line) {
   if (!plan.commands.empty()) {
-    line.say("left out, as whoever hears it acts: {}; name a topic in full to play it", fmt::join(plan.commands, ", "));
+    line.say("not played, because a robot would obey: {}; name a topic in full to play it",
+             fmt::join(plan.commands, ", "));
   }
-  for (const std::string& reason : plan.impossible) line.say("left out: {}", reason);
+  for (const std::string& reason : plan.impossible) line.say("not played: {}", reason);
   std::string states;
   for (const PlayedTopic& topic : plan.played) {
     if (topic.is_state) states += (states.empty() ? "" : ", ") + topic.name;
   }
-  if (!states.empty()) line.say("after a seek their last message is sent again: {}", states);
+  if (verbose && !states.empty()) line.say("after a seek the last message of these is sent again: {}", states);
 }
 
 int play(const Arguments& arguments, PlayerOptions options, std::stop_token stop) {
@@ -72,11 +74,14 @@ int play(const Arguments& arguments, PlayerOptions options, std::stop_token stop
   }
   auto reader_result = BagReader::open(arguments.bag);
   if (!reader_result) return fail(reader_result.error());
+  std::vector<std::string> findings;
+  for (const Finding& finding : (*reader_result)->findings()) findings.push_back(finding.text());
   const auto plan_result = plan_topics((*reader_result)->info(), choice);
   if (!plan_result) return fail(plan_result.error());
 
   common::LiveLine line("jostle play");
-  tell_what_is_left_out(*plan_result, line);
+  for (const std::string& text : findings) line.say("{}", text);
+  tell_what_is_left_out(*plan_result, arguments.verbose, line);
   auto player_result = Player::create(std::move(*reader_result), *plan_result, std::move(options), line);
   if (!player_result) return fail(player_result.error());
   PlayReport report;
@@ -105,7 +110,7 @@ int control(const Arguments& arguments, const RemoteOptions& options, std::stop_
   for (const std::string& text : arguments.controls) {
     if (text == "status") continue;  // shown anyway
     auto control_result = parse_control(text);
-    if (!control_result) return fail(control_result.error());
+    if (!control_result) return fail({control_result.error().code, control_result.error().message + ", or status"});
     controls.push_back(std::move(*control_result));
   }
   const auto status_result = control_remotely(controls, options, std::move(stop));
@@ -159,6 +164,7 @@ int main(int argc, char** argv) {
                      "pause, resume, toggle, step, seek:SECONDS, rate:FACTOR, loop:0, loop:1, quit, status")
           ->expected(1, -1)
           ->excludes(bag);
+  app.add_flag("-v,--verbose", arguments.verbose, "Say also what is sent again after a seek");
   app.add_option("--json", arguments.json, "File for what was played, and how punctually");
   common::add_process_options(app, process);
   app.footer(

@@ -167,6 +167,12 @@ Playback::State Playback::state() const {
   return paused_ ? State::kPaused : State::kPlaying;
 }
 
+std::optional<std::chrono::nanoseconds> Playback::next() {
+  const Message* message = ended_ ? nullptr : ahead_.peek();
+  if (message == nullptr) return {};
+  return std::chrono::nanoseconds(message->log_time - zero_);
+}
+
 std::chrono::nanoseconds Playback::at(TimePoint now) const {
   const Time moment = seeking_ == Seeking::kNo ? timeline_.at(now) : target_;
   return std::chrono::nanoseconds(std::clamp(moment, first_, last_) - zero_);

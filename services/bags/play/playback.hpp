@@ -83,6 +83,8 @@ class Playback {
   std::chrono::nanoseconds at(TimePoint now) const;  ///< offset
   std::chrono::nanoseconds first() const { return std::chrono::nanoseconds(first_ - zero_); }
   std::chrono::nanoseconds last() const { return std::chrono::nanoseconds(last_ - zero_); }
+  /// Returns the offset of the message that comes next; nothing while it is not read, and at the end.
+  std::optional<std::chrono::nanoseconds> next();
   Time time(TimePoint now) const { return zero_ + at(now).count(); }
   double rate() const { return timeline_.rate(); }
   bool loops() const { return options_.loop; }

@@ -1,5 +1,6 @@
 #include "services/bags/play/player.hpp"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/eventfd.h>
@@ -32,8 +33,17 @@ using jostle_msgs::msg::PlayStatus;
 constexpr auto kTick = 100ms;      // status, the line, a look at who is there
 constexpr auto kRateWindow = 1s;   // over which rates of topics are counted
 constexpr auto kLastSamples = 2s;  // for readers to receive them before writers go
+constexpr auto kLongGap = 60s;     // without a message, after which somebody wonders
 constexpr std::size_t kRememberedControls = 64;
 constexpr std::size_t kWaitingControls = 256;
+
+// "90 s", "3.0 hours", "12 days", "53.9 years"
+std::string long_time_text(double seconds) {
+  constexpr double kHour = 3600, kDay = 24 * kHour, kYear = 365.25 * kDay;
+  if (seconds < kHour) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 2 * kDay) return fmt::format("{:.1f} hours", seconds / kHour);
+  return seconds < kYear ? fmt::format("{:.0f} days", seconds / kDay) : fmt::format("{:.1f} years", seconds / kYear);
+}
 
 /// Ends a wait of poll(2) from any thread.
 class WakeUp {
@@ -204,10 +214,25 @@ struct Player::Impl {
       draw(state, now);
       if (playback->state() == Playback::State::kPaused) publisher->tell_newcomers();
       warn_of_others();
+      tell_of_gap(now);
       if (now >= next_tick) next_tick = now + kTick;
       changed = false;
     }
     return clock ? std::min(next_tick, next_clock) : next_tick;
+  }
+
+  // A message of time 0 before all others, or a clock that was set, and nothing comes for years.
+  void tell_of_gap(TimePoint now) {
+    if (playback->state() != Playback::State::kPlaying) return;
+    const auto next = playback->next();
+    if (!next || next == told_gap) return;
+    const double wait = seconds(*next - playback->at(now)) / playback->rate();
+    if (wait < seconds(kLongGap)) return;
+    told_gap = next;
+    line.say("a gap: the next message, of {:%F %T} UTC, comes in {}; remedy: --start {:.0f}, or --control seek:{:.0f}",
+             fmt::gmtime(
+                 static_cast<std::time_t>((playback->time(now) + (*next - playback->at(now)).count()) / 1'000'000'000)),
+             long_time_text(wait), std::floor(seconds(*next)), std::floor(seconds(*next)));
   }
 
   void warn_of_others() {
@@ -312,6 +337,7 @@ struct Player::Impl {
   std::optional<TimePoint> began;
   Rates rates;
   std::set<std::string> warned;
+  std::optional<std::chrono::nanoseconds> told_gap;  // where the last one ends
 
   std::optional<wire::Reader<PlayControl>> control_reader;  // last: fills what is above
 };

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string_view>
 
+#include "services/bags/format/definitions.hpp"
 #include "services/wire/dds/names.hpp"
 #include "services/wire/dds/system_topics.hpp"
 #include "services/wire/dds/topics.hpp"
@@ -31,11 +32,16 @@ constexpr std::array<std::string_view, 7> kCommandTypes{"jostle_msgs/msg/Velocit
 
 std::string last_word(const std::string& topic) { return topic.substr(topic.rfind('/') + 1); }
 
-const std::string& name_of(const TopicInfo& info) { return info.topic.name; }
+// Whoever wrote the bag may have used names of the wire, or short ones.
+Topic as_ros_names_it(Topic topic) {
+  topic.name = ros_topic_name(topic.name);
+  topic.type = ros_type_name(topic.type);
+  return topic;
+}
 
 std::string names_of(const BagInfo& bag) {
   std::string names;
-  for (const auto& info : bag.topics) names += (names.empty() ? "" : ", ") + info.topic.name;
+  for (const auto& info : bag.topics) names += (names.empty() ? "" : ", ") + ros_topic_name(info.topic.name);
   return names.empty() ? "none" : names;
 }
 
@@ -61,6 +67,7 @@ std::string played_name(const TopicChoice& choice, const std::string& topic) {
 
 // Why a topic cannot be played, if so.
 std::optional<std::string> hindrance(const TopicChoice& choice, const Topic& topic, const std::string& name) {
+  if (topic.encoding != "cdr") return fmt::format("its messages are encoded as '{}', wanted 'cdr'", topic.encoding);
   const auto type = wire::wire_type(topic.type);
   if (!type) return fmt::format("its type {} is no ROS 2 message", topic.type);
   if (name.starts_with("/play/") || topic.type.starts_with("jostle_msgs/msg/Play")) return "this playback has its own";
@@ -95,15 +102,17 @@ bool commands_somebody(const Topic& topic) {
 }
 
 Result<TopicPlan> plan_topics(const BagInfo& bag, const TopicChoice& choice) {
+  std::vector<Topic> topics;
+  for (const TopicInfo& info : bag.topics) topics.push_back(as_ros_names_it(info.topic));
   for (const auto& [from, to] : choice.remaps) {
-    if (std::ranges::count(bag.topics, from, name_of) > 0) continue;
+    if (std::ranges::count(topics, from, &Topic::name) > 0) continue;
     return Error{Code::kInvalidArgument,
                  fmt::format("--remap: {} has no topic {}; it has {}", bag.path.string(), from, names_of(bag))};
   }
   TopicPlan plan;
   std::map<std::string, std::string> types;  // by name when played
   for (std::size_t i = 0; i < bag.topics.size(); ++i) {
-    const Topic& topic = bag.topics[i].topic;
+    const Topic& topic = topics[i];
     if (!choice.selection.wants(topic.name)) continue;
     const std::string name = played_name(choice, topic.name);
     if (commands_somebody(topic) && !is_named(choice, topic.name)) {

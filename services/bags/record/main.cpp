@@ -48,6 +48,32 @@ std::string size_text(std::uint64_t bytes) {
   return mebibytes < 1024 ? fmt::format("{:.1f} MiB", mebibytes) : fmt::format("{:.1f} GiB", mebibytes / 1024);
 }
 
+// Counts of seconds, in the words of all our errors; CLI11's own show the largest number there is.
+CLI::Validator seconds_from(double least) {
+  return CLI::Validator(
+      [least](std::string& text) -> std::string {
+        double value = 0.0;
+        constexpr double kMost = 1e9;  // 32 years
+        if (CLI::detail::lexical_cast(text, value) && value >= least && value <= kMost) return {};
+        return fmt::format("got {}, wanted {} s or more", text, least);
+      },
+      "SECONDS");
+}
+
+CLI::Validator bytes_from(std::uint64_t least) {
+  return CLI::Validator(
+      [least](std::string& text) -> std::string {
+        std::uint64_t value = 0;
+        if (CLI::detail::lexical_cast(text, value) && value >= least) return {};
+        return fmt::format("got {} bytes, wanted {} or more", text, least);
+      },
+      "");
+}
+
+constexpr double kShortest = 0.001;    // s
+constexpr double kShortestPart = 0.1;  // s, and bytes: smaller parts hold a message each
+constexpr std::uint64_t kSmallestPart = 10'000;
+
 // A line that is drawn over and over in a terminal; nothing where the output is a file.
 // Threads: any.
 class Line {
@@ -163,13 +189,15 @@ int main(int argc, char** argv) {
   app.add_flag("--no-compress", arguments.no_compress, "Plain MCAP: three times the size, less processor time");
   const CLI::AsSizeValue bytes(false);
   app.add_option("--split-size", options.bag.split_bytes, "A new file after so many bytes, such as 500MB")
-      ->transform(bytes);
-  app.add_option("--split-time", arguments.split_time, "A new file after so many seconds")->check(CLI::PositiveNumber);
+      ->transform(bytes)
+      ->check(bytes_from(kSmallestPart));
+  app.add_option("--split-time", arguments.split_time, "A new file after so many seconds")
+      ->check(seconds_from(kShortestPart));
   auto* ring =
       app.add_option("--ring", arguments.ring,
                      "Keep the last so many seconds in memory; SIGUSR1, or a std_msgs/msg/Empty on /record/trigger, "
                      "writes them\ninto FOLDER-1, the next time into FOLDER-2, and so on")
-          ->check(CLI::PositiveNumber);
+          ->check(seconds_from(kShortest));
   app.add_option("--max-memory", options.max_memory,
                  "Bytes of samples in memory: what waits to be written, and the ring")
       ->default_str("256MiB")
@@ -177,7 +205,7 @@ int main(int argc, char** argv) {
   app.add_option("--min-free", options.min_free, "End before less than so many bytes of the disk are free; 0: never")
       ->default_str("512MiB")
       ->transform(bytes);
-  app.add_option("--duration", arguments.duration, "End after so many seconds")->check(CLI::PositiveNumber);
+  app.add_option("--duration", arguments.duration, "End after so many seconds")->check(seconds_from(kShortest));
   app.add_flag("--until-result", options.until_result, "End after a task's result")->excludes(ring);
   app.add_option("--json", arguments.json, "File for what was recorded and lost, by topic");
   common::add_process_options(app, process);

@@ -1,10 +1,12 @@
 #include "services/bags/record/recorder.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/statvfs.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <utility>
 
@@ -17,17 +19,13 @@ namespace {
 
 constexpr std::chrono::milliseconds kTick{50};
 constexpr std::chrono::milliseconds kFlush{400};        // and a tick: half a second at most
+constexpr std::chrono::seconds kSettled{3};             // topics that are there have been found by then
 constexpr std::chrono::milliseconds kAfterResult{300};  // the last words around a result
 constexpr std::uint64_t kLookAtDisk = 16 << 20;         // bytes written before the next look at the disk
 
 // Reliable, as `ros2 topic pub` is: a best-effort reader misses what comes before it has found
 // the writer, even if the writer has found it.
 const wire::RawTopic kTrigger{"rt/record/trigger", "std_msgs::msg::dds_::Empty_", {.depth = kKeepAll}};
-
-Time wall_clock() {
-  const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
-  return now.count();
-}
 
 // Free bytes of the disk that a file will be on; its folder may not be there yet.
 Result<std::uint64_t> free_disk(std::filesystem::path place) {
@@ -133,9 +131,9 @@ Result<void> Recorder::await_triggers() {
 Recorder::Recorder(RecordOptions options, Watcher watcher)
     : options_(std::move(options)),
       watcher_(std::move(watcher)),
-      started_at_(wall_clock()),
+      started_at_(clock_.at(started_)),
       // A ring needs most of the memory for itself.
-      queue_(options_.ring.count() > 0 ? options_.max_memory / 4 : options_.max_memory) {}
+      queue_(options_.ring.count() > 0 ? options_.max_memory / 4 : options_.max_memory, clock_) {}
 
 Recorder::~Recorder() {
   trigger_reader_.reset();
@@ -175,7 +173,9 @@ RecordReport Recorder::run(std::stop_token stop) {
   std::optional<Clock::time_point> end;
   if (options_.duration.count() > 0) end = started_ + options_.duration;
   std::string reason = "stopped";
+  bool has_settled = false;
   for (;;) {
+    look_at_clock();
     if (auto ok = take_in_all(queue_.take(Clock::now() + kTick, stop)); !ok) return finish("failed", ok.error());
     write_snapshots();
     const auto now = Clock::now();
@@ -184,6 +184,7 @@ RecordReport Recorder::run(std::stop_token stop) {
       reason = "the task has a result";
       result_seen_ = false;
     }
+    if (now - started_ >= kSettled && !std::exchange(has_settled, true)) warn_of_unmatched_globs();
     if (now - flushed >= kFlush) {
       flushed = now;
       if (bag_) {
@@ -216,7 +217,8 @@ Result<void> Recorder::take_in(QueuedSample sample) {
   Tally& tally = tally_of(sample.topic);
   const std::uint64_t memory = sample.memory();
   // Results of earlier tasks are kept by who wrote them.
-  if (options_.until_result && tally.is_result && sample.publish_time >= started_at_) result_seen_ = true;
+  if (options_.until_result && tally.is_result && sample.publish_time >= started_at_ + clock_.set_by().count())
+    result_seen_ = true;
   if (bag_) {
     if (auto ok = bag_->write(sample, sample.log_time); !ok) {
       ++tally.unwritten;
@@ -274,7 +276,7 @@ void Recorder::write_snapshots() {
   if (bag_) return warn("a trigger without --ring does nothing: everything is recorded anyway");
   // What came before the trigger may still wait.
   if (auto ok = take_in_all(queue_.take(Clock::now(), {})); !ok) return warn(ok.error().message);
-  forget_old(wall_clock());
+  forget_old(clock_.at(Clock::now()));
   if (ring_.empty() && in_force_.empty()) return warn("the ring is empty: nothing was written");
   auto written = check_disk();
   if (written) written = write_snapshot();
@@ -290,7 +292,7 @@ Result<void> Recorder::write_snapshot() {
   if (!writer_result) return writer_result.error();
   bags_.push_back(folder);
   OpenBag snapshot(std::move(writer_result).value(), *subscriptions_);
-  const Time begin = ring_.empty() ? wall_clock() : ring_.front().log_time;
+  const Time begin = ring_.empty() ? clock_.at(Clock::now()) : ring_.front().log_time;
   Result<void> result;
   // What latched topics last said before the ring begins is what holds when it begins.
   for (const auto& [topic, sample] : in_force_) {
@@ -301,11 +303,39 @@ Result<void> Recorder::write_snapshot() {
   }
   snapshot.writer().set_note("record", options_.note);
   snapshot.writer().set_note("lost", lost_note());
+  if (!clock_note_.empty()) snapshot.writer().set_note("clock", clock_note_);
   auto closed = snapshot.writer().close();
   snapshot_bytes_ += snapshot.writer().bytes();
   if (result) result = closed;
   if (result && watcher_.on_snapshot) watcher_.on_snapshot(folder);
   return result;
+}
+
+void Recorder::look_at_clock() {
+  const std::chrono::duration<double> step = clock_.look();
+  if (step.count() == 0.0) return;
+  const std::chrono::duration<double> elapsed = Clock::now() - started_;
+  warn(
+      fmt::format("the wall clock was set {} by {:.3f} s; log times go on evenly, those at which others say they sent "
+                  "may not",
+                  step.count() < 0 ? "back" : "forward", std::abs(step.count())));
+  constexpr std::size_t kMostSteps = 100;
+  if (clock_note_.size() >= kMostSteps) return;
+  clock_note_[fmt::format("after {:.1f} s", elapsed.count())] = fmt::format("set by {:+.3f} s", step.count());
+  if (bag_) bag_->writer().set_note("clock", clock_note_);
+}
+
+void Recorder::warn_of_unmatched_globs() const {
+  const std::vector<std::string> others = subscriptions_->passed_over();
+  for (const std::string& glob : options_.selection.topics) {
+    bool found = false;
+    for (int topic = 0; topic < topics() && !found; ++topic)
+      found = Selection{.topics = {glob}}.wants(subscriptions_->topic(topic).name);
+    if (found) continue;
+    warn(
+        fmt::format("{}: no topic of that name that can be recorded was found so far; {}", glob,
+                    others.empty() ? "others were not, either" : fmt::format("there are {}", fmt::join(others, ", "))));
+  }
 }
 
 void Recorder::warn(const std::string& text) const {
@@ -369,12 +399,7 @@ RecordReport Recorder::finish(std::string reason, std::optional<Error> failure) 
         topic, refusals));
   }
   subscriptions_->close();
-  for (const std::string& glob : options_.selection.topics) {
-    bool found = false;
-    for (int topic = 0; topic < topics() && !found; ++topic)
-      found = Selection{.topics = {glob}}.wants(subscriptions_->topic(topic).name);
-    if (!found) warn(fmt::format("{}: no topic of that name that can be recorded was found", glob));
-  }
+  warn_of_unmatched_globs();
   // What came before the end belongs to it; after a failed write it is counted as lost.
   auto rest = queue_.take(Clock::now(), {});
   if (failure) {

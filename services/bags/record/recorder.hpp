@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "services/bags/format/bag_writer.hpp"
+#include "services/bags/record/record_clock.hpp"
 #include "services/bags/record/sample_queue.hpp"
 #include "services/bags/record/subscriptions.hpp"
 #include "services/wire/dds/raw.hpp"
@@ -66,6 +67,8 @@ struct RecordReport {
 ///
 /// Notes in the bag   "record"  RecordOptions::note
 ///                    "lost"    every topic's TopicCount::lost as it is known when a file is closed
+///                    "clock"   when the wall clock was set, and by how much; only if it was
+/// Log times          go on evenly when the wall clock is set (RecordClock)
 /// Ring               the newest sample of a latched topic stays when its time is over, and stands
 ///                    at the beginning of what is written
 class Recorder {
@@ -122,6 +125,8 @@ class Recorder {
   Result<void> check_disk() const;
   void look_at_disk();
   void forget_old(Time now);
+  void look_at_clock();
+  void warn_of_unmatched_globs() const;
   Note lost_note() const;
   std::uint64_t lost(int topic) const;
   RecordStatus status() const;
@@ -131,7 +136,9 @@ class Recorder {
   const RecordOptions options_;
   const Watcher watcher_;
   const Clock::time_point started_ = Clock::now();
-  const Time started_at_;
+  RecordClock clock_;
+  const Time started_at_;  // by the wall clock
+  Note clock_note_;        // when the wall clock was set, and by how much
   SampleQueue queue_;
   std::atomic<int> triggers_ = 0;
   bool result_seen_ = false;

@@ -22,9 +22,8 @@ bool SampleQueue::push(int topic, std::span<const std::byte> data, Time publish_
     ++overflowed_[place];
     return false;
   }
-  // Here, so that times rise along the queue; the wall clock may be set back.
-  const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
-  sample.log_time = newest_ = std::max<Time>(newest_, now.count());
+  // Here, so that times rise along the queue.
+  sample.log_time = newest_ = std::max(newest_, clock_.at(std::chrono::steady_clock::now()));
   const bool wake = queued_ < kGoodDeal && queued_ + memory >= kGoodDeal;
   queued_ += memory;
   samples_.push_back(std::move(sample));

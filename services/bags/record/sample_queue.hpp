@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "services/bags/format/message.hpp"
+#include "services/bags/record/record_clock.hpp"
 
 namespace jostle::bags {
 
@@ -29,8 +30,9 @@ struct QueuedSample {
 /// Threads  push from any, take from one.
 class SampleQueue {
  public:
-  /// `capacity`: bytes, for what is in the queue and what the last take() gave out together.
-  explicit SampleQueue(std::uint64_t capacity) : capacity_(capacity) {}
+  /// `capacity`: bytes, for what is in the queue and what the last take() gave out together. `clock` stamps the
+  /// samples, and outlives the queue.
+  SampleQueue(std::uint64_t capacity, const RecordClock& clock) : capacity_(capacity), clock_(clock) {}
 
   /// Copies the sample and stamps it. False if there was no room.
   bool push(int topic, std::span<const std::byte> data, Time publish_time);
@@ -44,6 +46,7 @@ class SampleQueue {
 
  private:
   const std::uint64_t capacity_;
+  const RecordClock& clock_;
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable_any filled_;
   std::vector<QueuedSample> samples_;

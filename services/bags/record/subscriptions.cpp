@@ -31,6 +31,8 @@ Grade grade_of(bool reliable, bool latched) {
   return latched ? kLatched : kReliable;
 }
 
+constexpr std::size_t kShown = 20;  // topics that are not selected
+
 struct TopicState {
   int index = 0;
   std::string wire_name, wire_type;
@@ -119,7 +121,12 @@ struct Subscriptions::Impl {
 
   void consider(const wire::Endpoint& endpoint) {
     const auto name = wire::ros_topic(endpoint.topic);
-    if (!name || !wire::ros_type(endpoint.type) || !options.selection.wants(*name)) return;
+    if (!name || !wire::ros_type(endpoint.type)) return;
+    if (!options.selection.wants(*name)) {
+      const std::lock_guard lock(mutex);
+      if (passed_over.size() < kShown) passed_over.insert(*name);
+      return;
+    }
     TopicState* state = find(endpoint.topic);
     if (!state) state = add(endpoint.topic, endpoint.type, endpoint.keyed);
     if (!state) return;
@@ -212,6 +219,7 @@ struct Subscriptions::Impl {
   mutable std::mutex mutex;  // guards all below but the readers
   std::condition_variable_any news;
   std::deque<wire::Endpoint> found;
+  std::set<std::string> passed_over;
   std::map<std::string, Qos> offers;          // of the first writer, by the topic's name on the wire
   std::map<wire::Guid, std::string> writers;  // there now; their topics, likewise
   std::deque<std::unique_ptr<TopicState>> states;
@@ -270,6 +278,11 @@ std::uint64_t Subscriptions::missing(int index) const {
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> Subscriptions::unmatched() { return impl_->unmatched(); }
+
+std::vector<std::string> Subscriptions::passed_over() const {
+  const std::lock_guard lock(impl_->mutex);
+  return {impl_->passed_over.begin(), impl_->passed_over.end()};
+}
 
 void Subscriptions::close() { impl_->close(); }
 

@@ -59,6 +59,9 @@ class Subscriptions {
   /// refusals that the middleware tells of. No topic is subscribed to after this.
   std::vector<std::pair<std::string, std::uint64_t>> unmatched();
 
+  /// Returns topics of ROS 2 that were found and are not selected, the first of them.
+  std::vector<std::string> passed_over() const;
+
   /// Ends all callbacks: no on_sample follows.
   void close();
 

@@ -121,7 +121,7 @@ Result<RecordedMotion> RecordedMotion::read(BagReader& reader, const RecordedRun
     else
       samples.push_back(std::move(sample));
   }
-  return RecordedMotion(std::move(samples), layout);
+  return RecordedMotion(std::move(samples), layout, first.world);
 }
 
 RecordedMotion::Sample RecordedMotion::at(double time) const {

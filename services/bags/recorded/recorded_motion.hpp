@@ -32,17 +32,19 @@ class RecordedMotion {
                                      RunClock clock);
 
   double duration() const { return samples_.back().time; }  ///< s
+  double world_begin() const { return world_begin_; }       ///< s of the world's clock, at the first sample
 
   /// Interpolates: between two samples positions go straight and rotations turn evenly. Before the
   /// first and after the last one, everything stands still.
   Sample at(double time) const;
 
  private:
-  RecordedMotion(std::vector<Sample> samples, StateLayout layout)
-      : samples_(std::move(samples)), layout_(std::move(layout)) {}
+  RecordedMotion(std::vector<Sample> samples, StateLayout layout, double world_begin)
+      : samples_(std::move(samples)), layout_(std::move(layout)), world_begin_(world_begin) {}
 
   std::vector<Sample> samples_;  // times go up; at least one
   StateLayout layout_;
+  double world_begin_;  // s
 };
 
 }  // namespace jostle::bags

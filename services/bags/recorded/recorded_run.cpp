@@ -44,6 +44,9 @@ struct Parts {
 
 class Collector {
  public:
+  // One message that cannot be read costs the run only if the run needs it.
+  void skip(const std::string& why) { unreadable_.push_back(why); }
+
   Result<void> take(const std::string& type, const Message& message) {
     if (type == "jostle_msgs/msg/TaskRun") {
       return with<TaskRun>(message, [&](TaskRun run) {
@@ -72,6 +75,9 @@ class Collector {
   }
 
   Result<std::vector<RecordedRun>> runs(const BagInfo& info) const {
+    if (order_.empty() && !unreadable_.empty()) {
+      return Error{Code::kInvalidArgument, fmt::format("{}: {}", info.path.string(), unreadable_.front())};
+    }
     if (order_.empty()) {
       return Error{
           Code::kNotFound,
@@ -81,9 +87,10 @@ class Collector {
     }
     std::vector<RecordedRun> runs;
     for (const std::string& id : order_) {
-      auto run_result = complete(parts_.at(id), fmt::format("{}: run {}", info.path.string(), id));
+      auto run_result = complete(parts_.at(id), info, id);
       if (!run_result) return run_result.error();
       if (!run_result->result) run_result->end = info.end;
+      run_result->unreadable = unreadable_;
       runs.push_back(std::move(run_result).value());
     }
     return runs;
@@ -98,30 +105,46 @@ class Collector {
     return {};
   }
 
-  static Result<RecordedRun> complete(const Parts& parts, const std::string& where) {
+  Result<RecordedRun> complete(const Parts& parts, const BagInfo& info, const std::string& id) const {
+    const auto missing = [&](const char* what, std::size_t number) {
+      return Error{Code::kInvalidArgument, fmt::format("{}: run {}: {} {} is missing, wanted all; {}",
+                                                       info.path.string(), id, what, number, why_missing(info))};
+    };
     RecordedRun run{.run = *parts.run, .begin = parts.begin, .end = parts.end, .result = parts.result};
     for (const auto& [number, entry] : parts.observations) {
-      if (number != run.observations.size()) return missing(where, "observation", run.observations.size());
+      if (number != run.observations.size()) return missing("observation", run.observations.size());
       run.observations.push_back(entry.first);
       run.observed.push_back(entry.second);
     }
     for (const auto& [number, plan] : parts.plans) {
-      if (number != run.plans.size()) return missing(where, "plan", run.plans.size());
-      if (plan.observation() >= run.observations.size()) return missing(where, "observation", plan.observation());
+      if (number != run.plans.size()) return missing("plan", run.plans.size());
+      if (plan.observation() >= run.observations.size()) return missing("observation", plan.observation());
       run.plans.push_back(plan);
     }
-    if (run.observations.empty()) return missing(where, "observation", 0);
+    if (run.observations.empty()) return missing("observation", 0);
     return run;
   }
 
-  static Error missing(const std::string& where, const char* what, std::size_t number) {
-    return {Code::kInvalidArgument,
-            fmt::format("{}: {} {} is missing, wanted all; `jostle bag info` says whether the recorder lost some",
-                        where, what, number)};
+  // What the bag knows of it, likeliest first.
+  std::string why_missing(const BagInfo& info) const {
+    if (!unreadable_.empty()) return fmt::format("{} cannot be read: {}", unreadable_.size(), unreadable_.front());
+    if (info.notes.contains("recovered")) {
+      return "the bag was recovered from a damaged one, which did not have it any more; the note `recovered` of "
+             "`jostle bag info` says what was damaged";
+    }
+    if (const auto lost = info.notes.find(kLostNote); lost != info.notes.end()) {
+      for (const auto& [topic, count] : lost->second) {
+        const bool is_of_task = topic.ends_with("/task/observation") || topic.ends_with("/task/plan");
+        if (is_of_task && count != "0") return fmt::format("its recorder lost {} of {}", count, topic);
+      }
+      return "its recorder lost none: it was there too late, or the bag is a part of a whole one";
+    }
+    return "the bag does not say why: it was not recorded here, or its end is missing";
   }
 
   std::map<std::string, Parts> parts_;  // by goal
   std::vector<std::string> order_;      // of the runs' beginnings
+  std::vector<std::string> unreadable_;
 };
 
 }  // namespace
@@ -173,8 +196,7 @@ Result<std::vector<RecordedRun>> read_runs(BagReader& reader) {
     const Message& message = **message_result;
     const Topic& topic = reader.info().topics[static_cast<std::size_t>(message.topic)].topic;
     if (auto ok = collector.take(topic.type, message); !ok) {
-      return Error{ok.error().code,
-                   fmt::format("{}: {}: {}", reader.info().path.string(), topic.name, ok.error().message)};
+      collector.skip(fmt::format("{}: {}", topic.name, ok.error().message));
     }
   }
   return collector.runs(reader.info());

@@ -32,6 +32,7 @@ struct RecordedRun {
   std::vector<Time> observed;                               ///< when each was recorded
   std::vector<jostle_msgs::msg::Plan> plans;                ///< entry i has number i
   std::optional<jostle_msgs::msg::GoalResult> result;       ///< nothing: the recording ends before
+  std::vector<std::string> unreadable;  ///< messages of such topics in the bag that cannot be read, of any run
 
   /// Whether the run came to an end of its own, rather than being cancelled, timed out or cut off.
   bool concluded() const;
@@ -44,7 +45,7 @@ Result<std::vector<RecordedRun>> select_runs(std::vector<RecordedRun> runs, cons
 /// Reads every run of a bag, in the order they were taken up. Topics are found by their types,
 /// whatever namespace they are in.
 /// Errors   kNotFound         no run in it; says what there is and the remedy
-///          kInvalidArgument  an observation or a plan is missing; names it
+///          kInvalidArgument  an observation or a plan is missing; names it, and why as far as the bag knows
 ///          those of BagReader
 Result<std::vector<RecordedRun>> read_runs(BagReader& reader);
 

@@ -106,18 +106,18 @@ std::optional<Difference> compare_made(const Plan& a, const Plan& b) {
     return difference;
   }
   if (!same_bits(a.cost(), b.cost())) {
-    difference.field = "cost of equal controls";
+    difference.field = "cost, though the controls are equal";
     difference.recorded = number(a.cost(), "");
     difference.replayed = number(b.cost(), "");
     return difference;
   }
   if (!same_bits(a.states(), b.states())) {
-    difference.field = "states predicted for equal controls";
+    difference.field = "predicted states, though the controls are equal";
     difference.recorded = difference.replayed = "see the effect";
     return difference;
   }
   if (a.iterations() != b.iterations() || a.rollouts() != b.rollouts()) {
-    difference.field = "way to equal controls";
+    difference.field = "the search took another path to the same controls";
     difference.recorded = fmt::format("{} iterations, {} rollouts", a.iterations(), a.rollouts());
     difference.replayed = fmt::format("{} iterations, {} rollouts", b.iterations(), b.rollouts());
     return difference;

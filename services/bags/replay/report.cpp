@@ -14,15 +14,17 @@ std::string end_of(const RecordedRun& recorded) {
 
 std::string headline(const RecordedRun& recorded) {
   const auto& goal = recorded.run.goal();
-  return fmt::format("{}: {}, predictor {}, seed {}; {} plans, {} actions; {}\n  recorded by {}; {}; {}\n",
-                     goal.goal_id(), goal.controller(), goal.predictor(), goal.seed(), recorded.plans.size(),
-                     recorded.observations.size() - 1, end_of(recorded), recorded.run.build(), recorded.run.engine(),
-                     recorded.run.machine());
+  std::string text;
+  for (const std::string& message : recorded.unreadable) text += fmt::format("cannot be read: {}\n", message);
+  return text + fmt::format("{}: {}, predictor {}, seed {}; {} plans, {} actions; {}\n  recorded by {}; {}; {}\n",
+                            goal.goal_id(), goal.controller(), goal.predictor(), goal.seed(), recorded.plans.size(),
+                            recorded.observations.size() - 1, end_of(recorded), recorded.run.build(),
+                            recorded.run.engine(), recorded.run.machine());
 }
 
 std::string plan_line(const jostle_msgs::msg::Plan& replayed, const jostle_msgs::msg::Plan* recorded,
                       const StateLayout& layout) {
-  const char* judgement = "has no counterpart";
+  const char* judgement = "was not made in the recorded run";
   if (recorded) judgement = compare(layout, *recorded, replayed) ? "DIFFERS" : "equal";
   return fmt::format("  plan {:>3}  after action {:>2}  {:>3} iterations  {} steps  cost {:>10.4f}  {}\n",
                      replayed.number(), replayed.observation(), replayed.iterations(),
@@ -47,7 +49,7 @@ std::string verdict(const RecordedRun& recorded, const ReplayReport& report) {
   if (!first.given.empty()) text += fmt::format("  given      {}\n", first.given);
   if (!first.effect.empty()) text += fmt::format("  effect     {}\n", first.effect);
   for (const std::string& reason : report.reasons()) text += fmt::format("  why        {}\n", reason);
-  text += fmt::format("  in all     {} equal, each on what was observed in the recorded run\n", counts);
+  text += fmt::format("  altogether {} are equal; each was decided on what was observed in the recorded run\n", counts);
   text += fmt::format("  end        recorded: {}; replayed: {} ({} plans, {} actions)\n", end_of(recorded),
                       report.ended, report.decisions.plans.size(), report.decisions.observations.size() - 1);
   return text;

@@ -10,17 +10,26 @@ Decoders::Decoders(const BagInfo& info) {
     reasons_.emplace_back();
     decoders_.emplace_back();
     earlier_.emplace_back();
-    const std::string definition =
-        topic.topic.definition.empty() ? definition_of(topic.topic.type).value_or("") : topic.topic.definition;
-    if (definition.empty()) {
+    if (topic.topic.encoding != "cdr") {
       reasons_.back() =
-          fmt::format("{}: got no definition of {} in the bag, and none is known", topic.topic.name, topic.topic.type);
+          fmt::format("{}: got messages encoded as '{}', wanted 'cdr'", topic.topic.name, topic.topic.encoding);
       continue;
     }
-    auto decoder_result = Decoder::create(topic.topic.type, definition);
+    const std::string type = ros_type_name(topic.topic.type);
+    const bool brings_own = topic.topic.has_message_definition();
+    const std::optional<std::string> definition = brings_own ? topic.topic.definition : definition_of(type);
+    if (!definition) {
+      reasons_.back() = topic.topic.definition.empty()
+                            ? fmt::format("{}: got no definition of {} in the bag, and none is known", topic.topic.name,
+                                          topic.topic.type)
+                            : fmt::format("{}: got a definition of {} written as '{}', wanted 'ros2msg'",
+                                          topic.topic.name, topic.topic.type, topic.topic.schema);
+      continue;
+    }
+    auto decoder_result = Decoder::create(type, *definition);
     if (decoder_result) {
       decoders_.back().emplace(std::move(*decoder_result));
-      const auto earlier = topic.topic.definition.empty() ? earlier_definition_of(topic.topic.type) : std::nullopt;
+      const auto earlier = brings_own ? std::nullopt : earlier_definition_of(type);
       if (earlier) {
         if (auto earlier_result = Decoder::create(topic.topic.type, *earlier)) {
           earlier_.back().emplace(std::move(*earlier_result));

@@ -30,7 +30,11 @@ class Output {
   static Result<std::unique_ptr<Output>> open(const std::string& path) {
     auto output = std::unique_ptr<Output>(new Output);
     output->path_ = path;
-    output->file_ = path == "-" ? stdout : std::fopen(path.c_str(), "wxe");
+    // A device or a pipe is written to as it is; a file that is there is somebody's.
+    std::error_code ignored;
+    const fs::file_status status = fs::status(path, ignored);
+    output->is_ours_ = path != "-" && (!fs::exists(status) || fs::is_regular_file(status));
+    output->file_ = path == "-" ? stdout : std::fopen(path.c_str(), output->is_ours_ ? "wxe" : "we");
     if (output->file_ == nullptr) {
       const bool is_there = errno == EEXIST;
       return Error{is_there ? Code::kInvalidArgument : Code::kIo,
@@ -43,7 +47,7 @@ class Output {
     if (file_ == nullptr || file_ == stdout) return;
     std::fclose(file_);
     std::error_code ignored;
-    fs::remove(path_, ignored);
+    if (is_ours_) fs::remove(path_, ignored);
   }
 
   void write(const std::string& text) { std::fwrite(text.data(), 1, text.size(), file_); }
@@ -62,6 +66,7 @@ class Output {
   Output() = default;
   std::string path_;
   std::FILE* file_ = nullptr;
+  bool is_ours_ = false;  // a new file, which goes again
 };
 
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
@@ -163,9 +168,31 @@ struct Selection {
   Time from = 0, to = 0;
 };
 
+Result<void> check_times(const ExportArguments& arguments, const BagInfo& info) {
+  const double length = 1e-9 * static_cast<double>(info.end - info.start);
+  const auto wrong = [](const char* option, double got, const std::string& wanted) {
+    return Error{Code::kNotFound, fmt::format("{}: got {:g} s, wanted {}", option, got, wanted)};
+  };
+  for (const auto& [option, value] : {std::pair{"--from", arguments.from}, {"--to", arguments.to}}) {
+    if (value && !std::isfinite(*value)) return wrong(option, *value, "a number of seconds");
+  }
+  if (arguments.from && *arguments.from > length) {
+    return wrong("--from", *arguments.from, fmt::format("at most {:g} s, where the last message is", length));
+  }
+  if (arguments.to && *arguments.to < arguments.from.value_or(0.0)) {
+    return wrong("--to", *arguments.to, fmt::format("at least the {:g} s of --from", arguments.from.value_or(0.0)));
+  }
+  return {};
+}
+
 Result<Selection> select(const ExportArguments& arguments, const BagInfo& info, const Decoders& decoders) {
   Selection selection;
-  const auto at = [&](double seconds) { return info.start + static_cast<Time>(std::llround(seconds * 1e9)); };
+  if (auto ok = check_times(arguments, info); !ok) return ok.error();
+  // The bag's own times lie between 1970 and 2262, and so do those between its first and last.
+  const auto at = [&](double seconds) {
+    const double length = 1e-9 * static_cast<double>(info.end - info.start);
+    return seconds >= length ? info.end : info.start + static_cast<Time>(std::llround(std::max(seconds, 0.0) * 1e9));
+  };
   selection.from = arguments.from ? at(*arguments.from) : info.start;
   selection.to = arguments.to ? at(*arguments.to) : info.end;
   bool is_any = false;
@@ -180,7 +207,7 @@ Result<Selection> select(const ExportArguments& arguments, const BagInfo& info, 
     if (decoders.has(topic)) {
       selection.topics.push_back(topic);
     } else {
-      fmt::print(stderr, "jostle bag: left out: {}\n", decoders.reason(topic));
+      tell("left out: " + decoders.reason(topic));
     }
   }
   if (!is_any && !arguments.topics.empty()) {
@@ -194,10 +221,10 @@ Result<Selection> select(const ExportArguments& arguments, const BagInfo& info, 
   return selection;
 }
 
-// Calls use(message, decoded) -> void for every message of the selection.
+// Calls use(message, decoded) -> void for every message of the selection that decodes; tells `undecoded` of the others.
 template <class Use>
 Result<void> for_each(BagReader& reader, const Decoders& decoders, const Selection& selection, const char* what,
-                      std::stop_token stop, Use use) {
+                      Findings& undecoded, std::stop_token stop, Use use) {
   std::uint64_t total = 0, done = 0;
   for (const int topic : selection.topics) total += reader.info().topics[static_cast<std::size_t>(topic)].messages;
   common::ProgressLine progress({.doing = what, .unit = "messages", .wiped = true});
@@ -209,59 +236,87 @@ Result<void> for_each(BagReader& reader, const Decoders& decoders, const Selecti
     if (!message_result) return message_result.error();
     if (!*message_result || (*message_result)->log_time > selection.to) return {};
     auto json_result = decoders.decode(**message_result);
-    if (!json_result) return json_result.error();
-    use(**message_result, *json_result);
+    if (json_result) {
+      use(**message_result, *json_result);
+      continue;
+    }
+    const std::string& name = reader.info().topics[static_cast<std::size_t>((*message_result)->topic)].topic.name;
+    undecoded.lost(Part::kMessage, name + " cannot be decoded", json_result.error().message);
   }
 }
 
 Result<void> export_json(BagReader& reader, const Decoders& decoders, const Selection& selection,
-                         const std::string& path, std::stop_token stop) {
+                         const std::string& path, Findings& undecoded, std::stop_token stop) {
   auto output_result = Output::open(path);
   if (!output_result) return output_result.error();
-  auto ok = for_each(reader, decoders, selection, "exporting", stop, [&](const Message& message, const Json& json) {
-    const Json line{{"topic", reader.info().topics[static_cast<std::size_t>(message.topic)].topic.name},
-                    {"log_time", message.log_time},
-                    {"publish_time", message.publish_time},
-                    {"sequence", message.sequence},
-                    {"message", json}};
-    (*output_result)->write(dump(line) + "\n");
-  });
+  auto ok = for_each(
+      reader, decoders, selection, "exporting", undecoded, stop, [&](const Message& message, const Json& json) {
+        const Json line{{"topic", reader.info().topics[static_cast<std::size_t>(message.topic)].topic.name},
+                        {"log_time", message.log_time},
+                        {"publish_time", message.publish_time},
+                        {"sequence", message.sequence},
+                        {"message", json}};
+        (*output_result)->write(dump(line) + "\n");
+      });
   return ok ? (*output_result)->finish() : ok;
 }
 
-// "/robot/status" is robot_status.csv.
-std::string file_name(const std::string& topic) {
-  std::string name = topic.substr(std::min(topic.find_first_not_of('/'), topic.size()));
-  std::ranges::replace(name, '/', '_');
-  return (name.empty() ? "topic" : name) + ".csv";
+// "/robot/status" is robot_status.csv; a second topic that would be, "/robot_status", is robot_status_2.csv.
+class FileNames {
+ public:
+  std::string name_for(const std::string& topic) {
+    constexpr std::size_t kLongest = 200;  // bytes, of the 255 that a file system takes
+    std::string name = topic.substr(std::min(topic.find_first_not_of('/'), topic.size())).substr(0, kLongest);
+    for (char& c : name) {
+      if (c == '/' || static_cast<unsigned char>(c) < ' ') c = '_';
+    }
+    if (name.empty()) name = "topic";
+    std::string unique = name;
+    for (int number = 2; !taken_.insert(unique).second; ++number) unique = fmt::format("{}_{}", name, number);
+    return unique + ".csv";
+  }
+
+ private:
+  std::set<std::string> taken_;
+};
+
+// A folder that is there may hold something else, a bag for one.
+Result<void> check_folder(const std::string& folder) {
+  std::error_code problem;
+  if (folder == "-" || !fs::exists(folder, problem) || fs::is_empty(folder, problem)) return {};
+  return Error{Code::kInvalidArgument,
+               fmt::format("--output: got {}, which is there, wanted a new or an empty folder", folder)};
 }
 
 Result<void> export_csv(BagReader& reader, const Decoders& decoders, const Selection& selection,
-                        const std::string& folder, std::stop_token stop) {
+                        const std::string& folder, Findings& undecoded, std::stop_token stop) {
   if (folder == "-" && selection.topics.size() > 1) {
     return Error{Code::kInvalidArgument,
                  fmt::format("--csv to standard output: got {} topics, wanted one; remedy: --topic, or --output FOLDER",
                              selection.topics.size())};
   }
+  if (auto ok = check_folder(folder); !ok) return ok;
   std::map<int, Columns> columns;
-  auto ok = for_each(reader, decoders, selection, "looking for columns", stop,
+  auto ok = for_each(reader, decoders, selection, "looking for columns", undecoded, stop,
                      [&](const Message& message, const Json& json) { columns[message.topic].add(json); });
   if (!ok) return ok;
   std::error_code problem;
   const bool is_new = folder != "-" && fs::create_directories(folder, problem);
   if (problem) return Error{Code::kIo, fmt::format("{}: cannot be made: {}", folder, problem.message())};
   std::map<int, std::unique_ptr<Output>> outputs;
+  FileNames names;
+  Findings known;  // the same again
   const auto write_all = [&]() -> Result<void> {
     for (auto& [topic, found] : columns) {
       found.finish();
-      const std::string name = file_name(reader.info().topics[static_cast<std::size_t>(topic)].topic.name);
+      const std::string name = names.name_for(reader.info().topics[static_cast<std::size_t>(topic)].topic.name);
       auto output_result = Output::open(folder == "-" ? "-" : (fs::path(folder) / name).string());
       if (!output_result) return output_result.error();
       (*output_result)->write(found.head());
       outputs[topic] = std::move(*output_result);
     }
     auto written =
-        for_each(reader, decoders, selection, "exporting", stop, [&](const Message& message, const Json& json) {
+        for_each(reader, decoders, selection, "exporting", known, stop, [&](const Message& message, const Json& json) {
           outputs[message.topic]->write(columns[message.topic].row(message, reader.info().start, json));
         });
     for (auto& [topic, output] : outputs) {
@@ -280,12 +335,16 @@ Result<void> export_csv(BagReader& reader, const Decoders& decoders, const Selec
 int export_bag(const ExportArguments& arguments, std::stop_token stop) {
   const auto reader_result = BagReader::open(arguments.bag);
   if (!reader_result) return fail(reader_result.error(), common::kExitUsage);
+  if ((*reader_result)->info().messages == 0) tell("got no messages that can be exported");
   const Decoders decoders((*reader_result)->info());
   const auto selection_result = select(arguments, (*reader_result)->info(), decoders);
   if (!selection_result) return fail(selection_result.error(), common::kExitFailed);
+  Findings undecoded;
   const auto ok = (arguments.as_csv ? export_csv : export_json)(**reader_result, decoders, *selection_result,
-                                                                arguments.output, stop);
-  if (ok) return common::kExitOk;
+                                                                arguments.output, undecoded, stop);
+  for (const Finding& finding : (*reader_result)->findings()) tell(finding.text());
+  for (const Finding& finding : undecoded.list()) tell(finding.text());
+  if (ok) return undecoded.empty() ? common::kExitOk : common::kExitFailed;
   return fail(ok.error(), ok.error().code == Code::kInvalidArgument ? common::kExitFailed : common::kExitBroken);
 }
 

@@ -1,14 +1,21 @@
 // jostle bag: looks into recordings, checks, saves and exports them.
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstring>
 #include <functional>
+#include <string_view>
 
 #include "services/bags/tool/commands.hpp"
+#include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
 
 namespace {
+
+constexpr const char* kPlot = "plot";
 
 constexpr const char* kExample =
     "Examples\n"
@@ -17,21 +24,25 @@ constexpr const char* kExample =
     "  jostle bag recover experiment                     what is readable of a damaged one, as experiment-recovered\n"
     "  jostle bag export experiment --csv -o tables      a table per topic\n"
     "  jostle bag export experiment --json --topic '/robot/*' --from 10 --to 12 | jq .message.q\n"
+    "  jostle bag plot experiment -o experiment.png      costs, distance and speeds of a run\n"
     "A bag is a folder, or one of its files (.mcap, .db3); those of rosbag2 are read, too. docs/bags.md says more.\n"
-    "Exit codes: 0 done, 1 verified and damaged, or nothing to save or export, 2 wrong arguments or a bag that cannot\n"
-    "be opened, 3 output cannot be written, 130 interrupted.";
+    "Exit codes: 0 done, 1 verified and damaged, something was lost, or nothing to save or export, 2 wrong arguments\n"
+    "or a bag that cannot be opened, 3 output cannot be written, 130 interrupted.";
+
+// Robots and scenes, which a plot needs, are no business of this program: another one beside it draws.
+int become_plot(char** argv) {
+  const std::string program = jostle::common::program_folder() / "jostle_bag_plot";
+  execv(program.c_str(), argv);
+  jostle::bags::tell(fmt::format("{}: cannot be started: {}", program, std::strerror(errno)));
+  return jostle::common::kExitBroken;
+}
 
 }  // namespace
-
-int jostle::bags::fail(const Error& error, int otherwise) {
-  fmt::print(stderr, "jostle bag: {}\n", error.message);
-  if (error.code == Code::kCancelled) return common::kExitInterrupted;
-  return error.code == Code::kNotFound ? common::kExitUsage : otherwise;
-}
 
 int main(int argc, char** argv) {
   using namespace jostle;
   using namespace jostle::bags;
+  if (argc > 1 && std::string_view(argv[1]) == kPlot) return become_plot(argv + 1);
   CLI::App app{"Looks into recordings, checks, saves and exports them.", "jostle bag"};
   app.footer(kExample);
   app.require_subcommand(1);
@@ -88,6 +99,8 @@ int main(int argc, char** argv) {
       return export_bag(exported, stop);
     };
   });
+
+  app.add_subcommand(kPlot, "a recorded run over time, as a picture: costs of plans, distance, speeds");
 
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   const common::StopSignal signal;

@@ -19,28 +19,82 @@ fs::path default_output(const fs::path& bag) {
   return named.parent_path() / (named.stem().string() + "-recovered");
 }
 
-// Every message that `from` gives out, in its order. How many.
-Result<std::uint64_t> copy(CheckedReader& from, BagWriter& to, std::stop_token stop) {
-  std::vector<int> topics;
-  for (const TopicInfo& topic : from.info().topics) {
-    auto index_result = to.add_topic(topic.topic);
-    if (!index_result) return index_result.error();
-    topics.push_back(*index_result);
-  }
-  std::uint64_t done = 0;
-  common::ProgressLine progress({.doing = "recovering", .unit = "messages", .wiped = true});
-  while (true) {
-    if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
-    progress.show(done, from.info().messages);
-    auto message_result = from.next();
-    if (!message_result) return message_result.error();
-    if (!*message_result) return done;
-    if (auto ok = to.write(topics[static_cast<std::size_t>((*message_result)->topic)], (*message_result)->view());
-        !ok) {
-      return ok.error();
+// Copies a bag as far as it can be read, and counts what was taken.
+class Copy {
+ public:
+  Copy(CheckedReader& from, BagWriter& to, std::stop_token stop) : from_(from), to_(to), stop_(std::move(stop)) {}
+
+  Result<void> make() {
+    const BagInfo& info = from_.info();
+    for (const auto& [name, note] : info.notes) to_.set_note(name, note);
+    for (const NamedNote& note : info.earlier_notes) {
+      if (auto ok = keep(to_.add_note(note), Part::kNote); !ok) return ok;
     }
-    ++done;
+    notes_ += info.notes.size();
+    for (std::size_t i = 0; i < info.attachments.size(); ++i) {
+      auto attachment_result = from_.attachment(i);
+      if (!attachment_result) {
+        lost_.lost(Part::kAttachment, attachment_result.error().message, "");
+      } else if (auto ok = keep(to_.attach(*attachment_result), Part::kAttachment); !ok) {
+        return ok;
+      }
+    }
+    return copy_messages();
   }
+
+  std::uint64_t messages() const { return messages_; }
+  std::uint64_t notes() const { return notes_; }
+  std::uint64_t attachments() const { return attachments_; }
+  const Findings& lost() const { return lost_; }
+
+ private:
+  Result<void> copy_messages() {
+    std::vector<int> topics;
+    for (const TopicInfo& topic : from_.info().topics) {
+      auto index_result = to_.add_topic(topic.topic);
+      if (!index_result) return index_result.error();
+      topics.push_back(*index_result);
+    }
+    common::ProgressLine progress({.doing = "recovering", .unit = "messages", .wiped = true});
+    while (true) {
+      if (stop_.stop_requested()) return Error{Code::kCancelled, "interrupted"};
+      progress.show(messages_, from_.info().messages);
+      auto message_result = from_.next();
+      if (!message_result) return message_result.error();
+      if (!*message_result) return {};
+      const Message& message = **message_result;
+      if (auto ok = to_.write(topics[static_cast<std::size_t>(message.topic)], message.view()); !ok) return ok;
+      ++messages_;
+    }
+  }
+
+  // What the new bag has no room for is lost; that it cannot be written ends everything.
+  Result<void> keep(const Result<void>& kept, Part part) {
+    if (!kept && kept.error().code != Code::kInvalidArgument) return kept;
+    if (!kept) {
+      lost_.lost(part, kept.error().message, "");
+    } else {
+      ++(part == Part::kNote ? notes_ : attachments_);
+    }
+    return {};
+  }
+
+  CheckedReader& from_;
+  BagWriter& to_;
+  const std::stop_token stop_;
+  std::uint64_t messages_ = 0, notes_ = 0, attachments_ = 0;
+  Findings lost_;
+};
+
+// "2 messages, 1 chunk"
+std::string counts_of(const Findings& findings) {
+  std::string text;
+  for (int i = 0; i < kParts; ++i) {
+    const auto part = static_cast<Part>(i);
+    const std::uint64_t count = findings.count_lost(part);
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, name_of(part, count));
+  }
+  return text;
 }
 
 }  // namespace
@@ -57,24 +111,33 @@ int recover_bag(const RecoverArguments& arguments, std::stop_token stop) {
     return fail(writer_result.error(),
                 writer_result.error().code == Code::kInvalidArgument ? common::kExitUsage : common::kExitBroken);
   }
-  for (const auto& [name, note] : reader.info().notes) (*writer_result)->set_note(name, note);
-
-  const auto count_result = copy(reader, **writer_result, stop);
-  const auto damage = reader.damage();
+  Copy copy(reader, **writer_result, stop);
+  const auto copied = copy.make();
+  Findings findings;
+  findings.add_all(reader.findings());
+  findings.add_all(copy.lost().list());
   Note note{{"from", arguments.bag.string()}};
-  for (std::size_t i = 0; i < damage.size(); ++i) note[fmt::format("damage {}", i + 1)] = damage[i];
+  for (std::size_t i = 0; i < findings.list().size(); ++i) {
+    note[fmt::format("damage {}", i + 1)] = findings.list()[i].text();
+  }
   (*writer_result)->set_note("recovered", note);
-  auto closed = count_result ? (*writer_result)->close() : Result<void>(count_result.error());
+  auto closed = copied ? (*writer_result)->close() : copied;
   if (!closed) {
     writer_result->reset();
     std::error_code ignored;
     fs::remove_all(output, ignored);
     return fail(closed.error(), common::kExitBroken);
   }
-  for (const std::string& where : damage) fmt::print("damaged: {}\n", where);
-  if (damage.empty()) fmt::print("nothing is damaged\n");
-  fmt::print("{}: {} messages of {} topics\n", output.string(), *count_result, reader.info().topics.size());
-  return *count_result == 0 && !damage.empty() ? common::kExitFailed : common::kExitOk;
+  // Who reads this is doing what the remedy says.
+  for (const Finding& finding : findings.list()) {
+    const std::string text = finding.text();
+    fmt::print("damaged: {}\n", text.substr(0, text.find("; remedy: ")));
+  }
+  if (findings.empty()) fmt::print("nothing is damaged\n");
+  fmt::print("{}: {} messages of {} topics, {} attachments, {} notes; {}\n", output.string(), copy.messages(),
+             reader.info().topics.size(), copy.attachments(), copy.notes(),
+             findings.any_lost() ? "lost: " + counts_of(findings) : "nothing was lost");
+  return findings.any_lost() ? common::kExitFailed : common::kExitOk;
 }
 
 }  // namespace jostle::bags

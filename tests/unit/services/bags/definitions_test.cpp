@@ -157,9 +157,35 @@ TEST(DecoderTest, DecodesEveryKindOfFieldInBothByteOrders) {
   }
 }
 
+// In front of the characters stands how many; middlewares give them two bytes or four.
+TEST(DecoderTest, DecodesWideStringsOfEitherWidth) {
+  const auto sut = taken(Decoder::create("a/msg/W", "wstring text\nwstring<=3[] more\nint8 end\n"));
+  const std::u16string pair = u"h\u00e4\U0001F600";
+  const std::u32string whole = U"h\u00e4\U0001F600";
+  Cdr two, four;
+  const auto add = [](Cdr& to, const auto& text) {
+    to.add(static_cast<std::uint32_t>(text.size()));
+    for (const auto c : text) to.add(c);
+  };
+  add(two, pair);
+  add(four, whole);
+  for (Cdr* cdr : {&two, &four}) cdr->add(std::uint32_t{1});
+  add(two, std::u16string(u"x"));
+  add(four, std::u32string(U"x"));
+  const std::string wanted = "{\"text\":\"h\u00e4\U0001F600\",\"more\":[\"x\"],\"end\":7}";
+  EXPECT_EQ(taken(sut.decode(two.add(std::int8_t{7}).bytes())).dump(), wanted);
+  EXPECT_EQ(taken(sut.decode(four.add(std::int8_t{7}).bytes())).dump(), wanted);
+  Cdr half;
+  add(half, std::u16string(1, 0xD800));
+  EXPECT_EQ(taken(taken(Decoder::create("a/msg/W", "wstring text")).decode(half.bytes()))["text"], "\xEF\xBF\xBD");
+  Cdr huge;
+  EXPECT_FALSE(sut.decode(huge.add(~std::uint32_t{0}).bytes()));
+}
+
 TEST(DecoderTest, DecodesAStringAndAnEmptyMessage) {
   EXPECT_EQ(taken(decoder("std_msgs/msg/String").decode(cdr_of("hello")))["data"], "hello");
   EXPECT_EQ(taken(decoder("std_msgs/msg/Empty").decode(Bytes(5))).dump(), "{}");
+  EXPECT_EQ(taken(decoder("std_msgs/msg/Empty").decode(Bytes(4))).dump(), "{}");
 }
 
 TEST(DecoderTest, RefusesOtherBytesThanTheTypeHas) {
@@ -201,6 +227,14 @@ TEST(DecoderTest, NeverCrashesOnChangedBytes) {
   }
 }
 
+TEST(RosNames, AreFoundInNamesOfTheWireAndInShortOnes) {
+  for (const char* type : {"std_msgs/msg/String", "std_msgs/String", "std_msgs::msg::dds_::String_"}) {
+    EXPECT_EQ(bags::ros_type_name(type), "std_msgs/msg/String");
+  }
+  EXPECT_EQ(bags::ros_type_name("foxglove.Log"), "foxglove.Log");
+  for (const char* topic : {"/a/b", "rt/a/b", "a/b"}) EXPECT_EQ(bags::ros_topic_name(topic), "/a/b");
+}
+
 TEST(DecoderTest, RefusesMalformedDefinitions) {
   const auto error = [](const std::string& text) { return Decoder::create("a/msg/B", text).error().message; };
   EXPECT_THAT(error("float64 x\nfloat64"), HasSubstr("a/msg/B: line 2: got 'float64', wanted a type and a name"));
@@ -208,7 +242,7 @@ TEST(DecoderTest, RefusesMalformedDefinitions) {
   EXPECT_THAT(error("float64[x x"), HasSubstr("ends with ]"));
   EXPECT_THAT(error("Other x"), HasSubstr("got type a/Other"));
   EXPECT_THAT(error("B[] x"), HasSubstr("contains itself"));
-  EXPECT_THAT(error("wstring x"), HasSubstr("wstring"));
+  EXPECT_THAT(error("wstring<=3[<=2] x\nwchar y"), HasSubstr("line 2: got type a/wchar"));
   std::string deep = "T0 x\n";
   for (int i = 0; i < 5000; ++i) deep += "===\nMSG: a/T" + std::to_string(i) + "\nT" + std::to_string(i + 1) + " x\n";
   EXPECT_THAT(error(deep + "===\nMSG: a/T5000\nbool x\n"), HasSubstr("nested"));

@@ -158,10 +158,7 @@ TEST_F(McapFile, JoinsChannelsOfOneTopic) {
 
 TEST_F(McapFile, SaysWhatItCannotRead) {
   Bytes bytes = beginning();
-  mcap::append(bytes, mcap::Channel{.id = 1, .topic = "/x", .encoding = "json"});
   append_end(bytes);
-  EXPECT_THAT(BagReader::open(save(bytes)).error().message,
-              HasSubstr("topic /x: got messages encoded as 'json', wanted 'cdr'"));
   bytes[5] = std::byte{'1'};
   EXPECT_THAT(BagReader::open(save(bytes)).error().message, HasSubstr("a later program wrote it"));
 }
@@ -317,7 +314,7 @@ TEST_P(DamagedMcap, LosesNothingWhereOnlyRepeatedSamplesAreDamaged) {
 
   const auto sut = taken(bags::open_bag(folder_.path() / "bag", true));
 
-  EXPECT_FALSE(sut->damage().empty());
+  EXPECT_FALSE(sut->findings().empty());
   EXPECT_EQ(rest_of(*sut).size(), 9u);
   EXPECT_EQ(sut->info().messages, 9u);
 }

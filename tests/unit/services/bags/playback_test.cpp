@@ -327,6 +327,7 @@ class Damaged : public bags::BagReader {
  public:
   explicit Damaged(std::unique_ptr<bags::BagReader> whole) : whole_(std::move(whole)) {}
   const bags::BagInfo& info() const override { return whole_->info(); }
+  std::vector<bags::Finding> findings() const override { return {}; }
   void seek(bags::Time from, std::vector<int> topics) override { whole_->seek(from, std::move(topics)); }
   Result<std::optional<bags::Message>> next() override {
     if (count_++ == 2) return Error{Code::kInvalidArgument, "byte 77: damaged"};

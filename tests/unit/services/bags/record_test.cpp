@@ -55,10 +55,43 @@ TEST(SequenceSet, ForgetsOldGapsAndNeverTakesANumberTwice) {
   EXPECT_EQ(sut.missing(), 9'999u - 5'001u);
 }
 
+using Moment = bags::RecordClock::Moment;
+
+TEST(RecordClock, GoesOnEvenlyWhenTheWallClockIsSet) {
+  const Moment start = Moment() + 1h;
+  constexpr bags::Time kWall = 1'700'000'000'000'000'000;
+  bags::RecordClock sut(kWall, start);
+  bags::Time before = kWall;
+  for (int i = 1; i <= 100; ++i) {
+    const auto elapsed = i * 100ms;
+    // Set back by 2 s after 3 s, and forward by a day after 6 s.
+    const auto set = elapsed < 3s ? 0s : elapsed < 6s ? -2s : -2s + 24h;
+    const auto step = sut.look(kWall + std::chrono::nanoseconds(elapsed + set).count(), start + elapsed);
+    const auto wanted = i == 30 ? -2s : i == 60 ? 24h : 0s;
+    EXPECT_EQ(step, wanted) << i;
+    const bags::Time now = sut.at(start + elapsed);
+    EXPECT_EQ(now - before, std::chrono::nanoseconds(100ms).count()) << i;
+    before = now;
+  }
+  EXPECT_EQ(sut.set_by(), 24h - 2s);
+}
+
+TEST(RecordClock, FollowsAWallClockThatIsSlewed) {
+  const Moment start = Moment() + 1h;
+  bags::RecordClock sut(0, start);
+  // The wall clock gains 0.1 ms per second.
+  for (int i = 1; i <= 1000; ++i) {
+    EXPECT_EQ(sut.look(i * 1'000'100'000ll, start + i * 1s).count(), 0);
+  }
+  EXPECT_EQ(sut.at(start + 1000s), 1000 * 1'000'100'000ll);
+  EXPECT_EQ(sut.set_by().count(), 0);
+}
+
+const bags::RecordClock kClock;
 const std::vector<std::byte> kHundred(100);
 
 TEST(SampleQueue, CountsByTopicWhatHasNoRoomUntilTheRestIsDoneWith) {
-  SampleQueue sut(2 * (100 + sizeof(bags::QueuedSample)));
+  SampleQueue sut(2 * (100 + sizeof(bags::QueuedSample)), kClock);
   EXPECT_TRUE(sut.push(0, kHundred, 1));
   EXPECT_TRUE(sut.push(3, kHundred, 2));
   EXPECT_FALSE(sut.push(3, kHundred, 3));
@@ -78,7 +111,7 @@ TEST(SampleQueue, CountsByTopicWhatHasNoRoomUntilTheRestIsDoneWith) {
 }
 
 TEST(SampleQueue, WakesWhoeverWaitsForAGoodDealOrIsToldToStop) {
-  SampleQueue sut(64 << 20);
+  SampleQueue sut(64 << 20, kClock);
   const std::vector<std::byte> large(2 << 20);
   const auto never = std::chrono::steady_clock::now() + 1h;
   {
@@ -91,7 +124,7 @@ TEST(SampleQueue, WakesWhoeverWaitsForAGoodDealOrIsToldToStop) {
 }
 
 TEST(SampleQueue, PushesFromManyThreadsComeOutInOrderOfTime) {
-  SampleQueue sut(64 << 20);
+  SampleQueue sut(64 << 20, kClock);
   {
     std::vector<std::jthread> pushers;
     for (int topic = 0; topic < 4; ++topic) {

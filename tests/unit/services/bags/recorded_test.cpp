@@ -220,6 +220,33 @@ TEST_F(Recorded, AMissingObservationOrPlanIsNamed) {
   EXPECT_THAT(read_runs(*reader()).error().message, HasSubstr("run g: observation 1 is missing"));
 }
 
+TEST_F(Recorded, WhyAnObservationIsMissingIsSaidAsTheBagKnowsIt) {
+  begin("g", kSecond);
+  observe("g", 0, kSecond, 0, seen_at(0)), observe("g", 2, kSecond, 2, seen_at(0));
+  writer->set_note("lost", {{"/task/observation", "1"}});
+  EXPECT_THAT(read_runs(*reader()).error().message, HasSubstr("its recorder lost 1 of /task/observation"));
+}
+
+TEST_F(Recorded, ARecoveredBagSaysThatWhatIsMissingWasDamaged) {
+  begin("g", kSecond);
+  observe("g", 0, kSecond, 0, seen_at(0)), observe("g", 2, kSecond, 2, seen_at(0));
+  writer->set_note("lost", {{"/task/observation", "0"}});
+  writer->set_note("recovered", {{"damage 1", "1 chunk lost"}});
+  EXPECT_THAT(read_runs(*reader()).error().message, HasSubstr("the note `recovered`"));
+}
+
+TEST_F(Recorded, AMessageThatCannotBeReadCostsTheRunOnlyIfItIsNeeded) {
+  begin("g", kSecond), observe("g", 0, kSecond, 0, seen_at(0)), observe("g", 1, kSecond, 1, seen_at(0));
+  write_bytes("/task/result", "jostle_msgs/msg/GoalResult", 2 * kSecond, std::vector<std::byte>(3));
+
+  const auto runs_result = read_runs(*reader());
+
+  ASSERT_TRUE(runs_result) << runs_result.error().message;
+  EXPECT_EQ(runs_result->front().observations.size(), 2u);
+  ASSERT_EQ(runs_result->front().unreadable.size(), 1u);
+  EXPECT_THAT(runs_result->front().unreadable.front(), HasSubstr("/task/result"));
+}
+
 TEST_F(Recorded, APlanOfAnObservationThatIsMissingIsNamed) {
   begin("g", kSecond), observe("g", 0, kSecond, 0, seen_at(0)), plan("g", 0, 1, kSecond);
   EXPECT_THAT(read_runs(*reader()).error().message, HasSubstr("run g: observation 1 is missing"));

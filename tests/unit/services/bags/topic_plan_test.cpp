@@ -112,5 +112,25 @@ TEST(ParseRemap, WantsTwoTopics) {
     EXPECT_FALSE(bags::parse_remap(text)) << text;
 }
 
+TEST(TopicPlan, KnowsNamesOfTheWireAndShortOnes) {
+  const auto plan = taken(plan_topics(
+      bag_of({typed("/short", "std_msgs/String"), typed("rt/dds", "std_msgs::msg::dds_::String_"),
+              typed("rt/robot/command", "jostle_msgs::msg::dds_::VelocityCommand_"), typed("log", "foxglove.Log")}),
+      {}));
+  EXPECT_THAT(names(plan), ElementsAre("/short", "/dds"));
+  EXPECT_EQ(plan.played[0].wire.type, "std_msgs::msg::dds_::String_");
+  EXPECT_EQ(plan.played[1].wire.name, "rt/dds");
+  EXPECT_THAT(plan.commands, ElementsAre("/robot/command"));
+  EXPECT_THAT(plan.impossible, ElementsAre(HasSubstr("/log: its type foxglove.Log")));
+}
+
+TEST(TopicPlan, LeavesOutWhatIsNotCdr) {
+  auto topics = std::vector{typed("/x", "std_msgs/msg/String"), typed("/log", "std_msgs/msg/String")};
+  topics[1].encoding = "json";
+  const auto plan = taken(plan_topics(bag_of(topics), {}));
+  EXPECT_THAT(names(plan), ElementsAre("/x"));
+  EXPECT_THAT(plan.impossible, ElementsAre(HasSubstr("/log: its messages are encoded as 'json'")));
+}
+
 }  // namespace
 }  // namespace jostle::tests

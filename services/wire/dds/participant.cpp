@@ -23,6 +23,7 @@
 #include "services/wire/dds/directory.hpp"
 #include "services/wire/dds/endpoint_watch.hpp"
 #include "services/wire/dds/guard.hpp"
+#include "services/wire/dds/middleware_log.hpp"
 #include "services/wire/dds/profiles.hpp"
 #include "services/wire/dds/security.hpp"
 
@@ -54,7 +55,9 @@ std::string environment(const char* variable) {
 Result<void> load_profiles_once() {
   static const Result<void> result = [] {
     DomainParticipantFactory::get_instance()->load_profiles();  // its own: FASTRTPS_DEFAULT_PROFILES_FILE
-    return load_profiles(profiles_file());
+    auto ok = load_profiles(profiles_file());
+    limit_middleware_log();
+    return ok;
   }();
   return result;
 }

@@ -51,9 +51,11 @@ inline constexpr std::size_t kUnreadResults = 16'384;
 
 // --- datagrams -----------------------------------------------------------------
 
-/// How far the sequence number of a writer may be when it is heard for the first time. The middleware counts up to it
-/// one by one (3 to 30 ns each), with the receiving thread.
-inline constexpr std::int64_t kFirstNumber = std::int64_t{1} << 28;
+/// How far the sequence number of a writer may be when it is heard for the first time: that of 1000 samples a second
+/// for 12 days. The middleware counts up to it one by one (75 ns each), with the receiving thread; so all such numbers
+/// together may grow by so many a second, and who is beyond that has to wait.
+inline constexpr std::int64_t kFirstNumber = std::int64_t{1} << 30;
+inline constexpr std::int64_t kFirstNumbersPerSecond = std::int64_t{1} << 22;
 /// How far the number of a writer that is heard all the time may go at once, and per second of silence.
 inline constexpr std::int64_t kNumberLeap = std::int64_t{1} << 20;
 inline constexpr std::int64_t kNumbersPerSecond = 1'000'000;

@@ -106,6 +106,12 @@ bool statistics_come_last(Bytes datagram, std::size_t round_to) {
   return true;
 }
 
+// Saturates after minutes, long before anything overflows.
+std::int64_t grown(std::chrono::steady_clock::duration time, std::int64_t per_second) {
+  const double seconds = std::clamp(std::chrono::duration<double>(time).count(), 0.0, 1000.0);
+  return static_cast<std::int64_t>(seconds * static_cast<double>(per_second));
+}
+
 }  // namespace
 
 const char* to_string(Flaw flaw) {
@@ -189,12 +195,22 @@ Flaw Judge::judge(Bytes datagram, TimePoint now) {
   return Flaw::kNone;
 }
 
+bool Judge::may_begin_at(std::int64_t number, TimePoint now) {
+  if (number <= limits::kNumberLeap) return true;  // costs next to nothing
+  first_budget_ =
+      std::min(first_budget_ + grown(now - first_heard_, limits::kFirstNumbersPerSecond), limits::kFirstNumber);
+  first_heard_ = now;
+  if (number > first_budget_) return false;
+  first_budget_ -= number;
+  return true;
+}
+
 bool Judge::plausible(const Guid& writer, std::int64_t number, std::int64_t left_out, TimePoint now) {
   if (number < 0) return false;
   const std::lock_guard lock(mutex_);
   const auto found = writers_.find(writer);
   if (found == writers_.end()) {
-    if (std::max(number, left_out) > limits::kFirstNumber) return false;
+    if (!may_begin_at(std::max(number, left_out), now)) return false;
     if (writers_.size() >= limits::kWritersRemembered) forget_silent(now);
     if (writers_.size() < limits::kWritersRemembered) {
       writers_.emplace(writer, Progress{.number = number, .budget = limits::kNumberLeap, .heard = now});
@@ -202,10 +218,8 @@ bool Judge::plausible(const Guid& writer, std::int64_t number, std::int64_t left
     return true;
   }
   Progress& progress = found->second;
-  // Saturates after minutes of silence, long before anything overflows.
-  const double silence = std::min(std::chrono::duration<double>(now - progress.heard).count(), 1000.0);
-  progress.budget = std::min(progress.budget, limits::kNumberLeap) +
-                    static_cast<std::int64_t>(silence * static_cast<double>(limits::kNumbersPerSecond));
+  progress.budget =
+      std::min(progress.budget, limits::kNumberLeap) + grown(now - progress.heard, limits::kNumbersPerSecond);
   progress.heard = now;
   const std::int64_t price = std::max({number - progress.number, left_out, std::int64_t{0}});
   if (price > std::min(progress.budget, limits::kFirstNumber)) return false;

@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "services/wire/dds/guid.hpp"
+#include "services/wire/limits.hpp"
 
 namespace jostle::wire {
 
@@ -51,11 +52,14 @@ class Judge {
     std::size_t operator()(const Guid& guid) const;
   };
 
+  bool may_begin_at(std::int64_t number, TimePoint now);
   bool plausible(const Guid& writer, std::int64_t number, std::int64_t left_out, TimePoint now);
   void forget_silent(TimePoint now);
 
-  std::mutex mutex_;  // guards writers_
+  std::mutex mutex_;  // guards everything below
   std::unordered_map<Guid, Progress, HashGuid> writers_;
+  std::int64_t first_budget_ = limits::kFirstNumber;  // of numbers of writers that are heard for the first time
+  TimePoint first_heard_;
 };
 
 }  // namespace jostle::wire

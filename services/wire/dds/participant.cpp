@@ -26,7 +26,7 @@
 #include "services/wire/dds/core.hpp"
 #include "services/wire/dds/directory.hpp"
 #include "services/wire/dds/endpoint_watch.hpp"
-#include "services/wire/dds/log.hpp"
+#include "services/wire/dds/middleware_log.hpp"
 #include "services/wire/dds/profiles.hpp"
 #include "services/wire/dds/security.hpp"
 #include "services/wire/dds/transports.hpp"
@@ -61,7 +61,7 @@ Result<void> load_profiles_once() {
   static const Result<void> result = [] {
     DomainParticipantFactory::get_instance()->load_profiles();  // its own: FASTRTPS_DEFAULT_PROFILES_FILE
     auto loaded = load_profiles(profiles_file());
-    log_in_plain_lines();
+    limit_middleware_log();
     return loaded;
   }();
   return result;

@@ -1,12 +1,11 @@
 #include "services/wire/dds/reader.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 
+#include "services/common/process/trouble.hpp"
 #include "services/wire/dds/core.hpp"
 #include "services/wire/dds/profiles.hpp"
 
@@ -60,7 +59,7 @@ struct ReaderBase::Impl : DataReaderListener {
     try {
       on_sample(sample, origin);
     } catch (const std::exception& error) {
-      fmt::print(stderr, "{}: a sample was dropped: {}\n", topic->get_name(), error.what());
+      dropped.warn("{}: a sample was dropped: {}", topic->get_name(), common::shown(error.what()));
     }
   }
 
@@ -70,6 +69,7 @@ struct ReaderBase::Impl : DataReaderListener {
   eprosima::fastdds::dds::Topic* topic = nullptr;
   DataReader* reader = nullptr;
   Peers writers;
+  common::Trouble dropped{"samples were dropped"};
 
   std::mutex mutex;  // guards closed; held during a callback, so one runs at a time
   bool closed = false;

@@ -435,5 +435,35 @@ TEST_F(CoordinatorProcess, RefusesASecondGoalWhileBusyAndObeysCancel) {
   EXPECT_TRUE(result_of("third").success());
 }
 
+// What viewers of ROS 2 need: one clock for all stamps, and no transform twice without need.
+TEST_F(WorldLink, TheClockTellsTheTimeOfTheStampsAndTransformsDoNotRepeatThemselves) {
+  wire::Inbox<rosgraph_msgs::msg::Clock> clock{participant, wire::topics::kClock, 512};
+  wire::Inbox<sensor_msgs::msg::JointState> joints{participant, wire::topics::kJointStates, 512};
+  wire::Inbox<tf2_msgs::msg::TFMessage> transforms{participant, wire::topics::kTransforms, 512};
+  const auto sim = program("jostle_sim", {easy});
+  RobotClient robot{participant};
+  const std::vector<double> u(4, 0.0);
+  ASSERT_TRUE(soon(kPatience, [&] { return robot.execute(u, 0.5).has_value(); })) << sim->err();
+
+  double told = 0.0, stamped = 0.0;
+  std::size_t states = 0, standing = 0;
+  ASSERT_TRUE(soon(kPatience, [&] {
+    for (const auto& time : clock.take_all()) told = time.clock().sec() + 1e-9 * time.clock().nanosec();
+    for (const auto& state : joints.take_all()) {
+      stamped = world::seconds(state.header());
+      if (stamped >= 0.5) ++states;
+    }
+    for (const auto& message : transforms.take_all()) {
+      if (world::seconds(message.transforms().at(0).header()) >= 0.5) ++standing;
+    }
+    return states >= 10 && told >= 0.5;
+  }));
+
+  EXPECT_NEAR(told, 0.5, 1e-6);
+  EXPECT_NEAR(stamped, 0.5, 1e-6);
+  EXPECT_GE(standing, 1u);
+  EXPECT_LT(standing, states / 2) << "of " << states << " states of a world that stands";
+}
+
 }  // namespace
 }  // namespace jostle::tests

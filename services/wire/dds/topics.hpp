@@ -35,10 +35,12 @@ inline const Topic<msg::WorldDescription> kPoolWorld{"rt/pool/world", kCatalogue
 inline const Topic<msg::BatchControl> kPoolControl{"rt/pool/control", kTask, Scope::kDomain};
 inline const Topic<msg::AssignmentResult> kPoolResult{"rt/pool/result", kTask, Scope::kDomain};
 
-/// These are for bags that are played; the clock shows the bag's time.
+/// These are for bags that are played.
 inline const Topic<msg::PlayControl> kPlayControl{"rt/play/control", kCommand};
 inline const Topic<msg::PlayStatus> kPlayStatus{"rt/play/status", kLatched};
-inline const Topic<rosgraph_msgs::msg::Clock> kClock{"rt/clock", kState, Scope::kDomain};
+
+/// The time in the stamps of robot and objects: a simulated world's, or that of a bag which is played.
+inline const Topic<rosgraph_msgs::msg::Clock> kClock{"rt/clock", kState};
 
 /// Returns all of the above, in their order.
 inline auto all() {

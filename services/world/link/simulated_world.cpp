@@ -18,6 +18,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
+constexpr std::chrono::seconds kStandingTransforms{1};       // between equal transforms
 constexpr std::chrono::milliseconds kPublicationPeriod{50};  // of wall-clock time
 constexpr std::size_t kCommandQueue = 64;                    // of one participant
 constexpr std::size_t kPastEpochs = 64;                      // remembered, for commands that are late
@@ -34,6 +35,7 @@ SimulatedWorld::SimulatedWorld(const wire::Participant& participant, physics_poo
       objects_(participant, wire::topics::kObjectStates),
       poses_(participant, wire::topics::kObjectPoses),
       transforms_(participant, wire::topics::kTransforms),
+      clock_(participant, wire::topics::kClock),
       status_(participant, wire::topics::kRobotStatus),
       commands_(participant, wire::topics::kRobotCommand, kCommandQueue) {}
 
@@ -214,9 +216,17 @@ void SimulatedWorld::publish() {
                                    moved_ ? physics_pool::Measurement::kFeedback : physics_pool::Measurement::kInitial);
   const auto objects = to_message(object_readings(geometry.layout, seen), time);
   // States: when one is lost, the next one follows within kPublicationPeriod and says as much.
+  rosgraph_msgs::msg::Clock clock;
+  clock.clock(make_header(time).stamp());
+  (void)clock_.write(clock);
   (void)objects_.write(objects);
   (void)poses_.write(pose_array_message(objects));
-  (void)transforms_.write(transform_message(objects));
+  // tf2 complains of a transform that it has: while the world stands still, one now and then serves who comes late.
+  if (time != transforms_time_ || steady_clock::now() >= next_transforms_) {
+    transforms_time_ = time;
+    next_transforms_ = steady_clock::now() + kStandingTransforms;
+    (void)transforms_.write(transform_message(objects));
+  }
   const auto joints = joint_state_message(geometry.layout, truth, time);
   (void)joints_.write(joints);
 

@@ -94,12 +94,14 @@ class SimulatedWorld {
   bool moved_ = false;  // a command was begun
   bool busy_ = false;
   std::string error_;
-  std::chrono::steady_clock::time_point next_publication_;
+  std::chrono::steady_clock::time_point next_publication_, next_transforms_;
+  double transforms_time_ = -1.0;  // world time of the newest transforms, s
 
   wire::Writer<sensor_msgs::msg::JointState> joints_;
   wire::Writer<jostle_msgs::msg::ObjectStates> objects_;
   wire::Writer<geometry_msgs::msg::PoseArray> poses_;
   wire::Writer<tf2_msgs::msg::TFMessage> transforms_;
+  wire::Writer<rosgraph_msgs::msg::Clock> clock_;
   wire::Writer<jostle_msgs::msg::RobotStatus> status_;
   wire::Inbox<jostle_msgs::msg::VelocityCommand> commands_;
 };

@@ -2,7 +2,7 @@
 /// \file
 /// Limits: how much of the wire a process takes in. Whoever reaches a domain may send anything, and an honest peer may
 /// be broken; what goes beyond these numbers is refused or left out, counted, and said once a second. All limits of
-/// the system are here, so that each is said once and docs/several-machines.md can list them.
+/// the system are here, so that each is said once and docs/security.md can list them.
 
 #include <chrono>
 #include <cstddef>

@@ -249,6 +249,7 @@ class SqliteReader final : public FileReader {
     for (;;) {
       const std::int64_t before = last;
       const auto end = count_from(last);
+      if (options_.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
       if (last > before) stretches_.emplace_back(before, last);
       if (end) return {};
       const auto next = next_readable(last);
@@ -273,7 +274,7 @@ class SqliteReader final : public FileReader {
     if (!rows_result) return rows_result.error();
     rows_result->bind(1, last);
     Result<bool> row = true;
-    while ((row = rows_result->step()) && *row) {
+    while (!options_.stop.stop_requested() && (row = rows_result->step()) && *row) {
       last = rows_result->number(3);
       if (is_sound(*rows_result)) {
         add(rows_result->number(0), 1, rows_result->number(1), rows_result->number(1));

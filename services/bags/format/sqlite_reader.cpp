@@ -22,6 +22,9 @@ class SqliteReader final : public FileReader {
   SqliteReader(Database database, const OpenOptions& options) : database_(std::move(database)), options_(options) {}
 
   Result<void> open() {
+    if (database_.was_cut()) {
+      info_.findings.lost(Part::kRecord, "cut off within a page", database_.path().string());
+    }
     if (auto ok = check_version(); !ok) return ok;
     if (auto ok = read_topics(); !ok && !stepped_over(Part::kTopic, ok.error())) return ok;
     spans_.resize(ids_.size());

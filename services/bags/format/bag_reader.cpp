@@ -94,14 +94,15 @@ Result<BagFiles> files_of(const fs::path& path, bool recover) {
 
 class FolderReader final : public CheckedReader {
  public:
-  Result<void> open(const fs::path& path, bool recover) {
+  Result<void> open(const fs::path& path, bool recover, const std::stop_token& stop) {
     info_.path = path;
     auto files_result = files_of(path, recover);
     if (!files_result) return files_result.error();
     findings_ = std::move(files_result->findings);
     said_messages_ = files_result->messages;
     for (const fs::path& file : files_result->files) {
-      if (auto ok = open_file(file, recover); !ok) {
+      if (auto ok = open_file(file, recover, stop); !ok) {
+        if (ok.error().code == Code::kCancelled) return ok;
         if (!recover) return with_remedy(ok.error(), files_result->files.size());
         findings_.lost(Part::kFile, ok.error().message, "");
       }
@@ -227,13 +228,13 @@ class FolderReader final : public CheckedReader {
     return error;
   }
 
-  Result<void> open_file(const fs::path& path, bool recover) {
+  Result<void> open_file(const fs::path& path, bool recover, const std::stop_token& stop) {
     const Storage* storage = storage_of(path);
     if (storage == nullptr) {
       return Error{Code::kInvalidArgument, fmt::format("{}: got another ending, wanted .mcap or .db3", path.string())};
     }
     // The first one's are not given out yet: nobody has seen what it repeats.
-    auto reader_result = storage->open(path, {.skip_repeated = !files_.empty(), .recover = recover});
+    auto reader_result = storage->open(path, {.skip_repeated = !files_.empty(), .recover = recover, .stop = stop});
     if (!reader_result) return reader_result.error();
     // A folder may have both kinds; MCAP has room for all that either holds.
     if (info_.storage != mcap_storage().name) info_.storage = storage->name;
@@ -345,14 +346,14 @@ std::optional<int> BagReader::find_topic(const std::string& name) const {
   return static_cast<int>(topic - topics.begin());
 }
 
-Result<std::unique_ptr<CheckedReader>> open_bag(const fs::path& path, bool recover) {
+Result<std::unique_ptr<CheckedReader>> open_bag(const fs::path& path, bool recover, std::stop_token stop) {
   auto reader = std::make_unique<FolderReader>();
-  if (auto ok = reader->open(path, recover); !ok) return ok.error();
+  if (auto ok = reader->open(path, recover, stop); !ok) return ok.error();
   return std::unique_ptr<CheckedReader>(std::move(reader));
 }
 
 Result<std::unique_ptr<BagReader>> BagReader::open(const fs::path& path) {
-  auto reader_result = open_bag(path, false);
+  auto reader_result = open_bag(path, false, {});
   if (!reader_result) return reader_result.error();
   return std::unique_ptr<BagReader>(std::move(*reader_result));
 }

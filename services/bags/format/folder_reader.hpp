@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,9 @@ class CheckedReader : public BagReader {
 };
 
 /// Opens a bag as BagReader::open does. `recover`: takes what is readable of damaged files, and of a folder every
-/// file, whatever its metadata.yaml says; fails only if nothing is readable.
-Result<std::unique_ptr<CheckedReader>> open_bag(const std::filesystem::path& path, bool recover);
+/// file, whatever its metadata.yaml says; fails only if nothing is readable. A look at a whole file ends with
+/// kCancelled once `stop` is requested.
+Result<std::unique_ptr<CheckedReader>> open_bag(const std::filesystem::path& path, bool recover,
+                                                std::stop_token stop = {});
 
 }  // namespace jostle::bags

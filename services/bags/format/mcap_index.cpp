@@ -340,7 +340,8 @@ Result<Index> index_of(const InputFile& file, const OpenOptions& options) {
   } else {
     // What a whole summary says of channels outlives the chunks that say it, too.
     Census census;
-    if (auto ok = scan(file, index.data_end, options.recover ? ScanMode::kRecover : ScanMode::kRead, index, census);
+    if (auto ok = scan(file, index.data_end, options.recover ? ScanMode::kRecover : ScanMode::kRead, index, census,
+                       options.stop);
         !ok) {
       return ok.error();
     }

@@ -80,6 +80,6 @@ Result<Index> index_of(const InputFile& file, const OpenOptions& options);
 
 /// Reads the whole file for what index_of() and reading do not look at: checksums, message
 /// indexes, and whether it holds what its summary says.
-Result<std::vector<Finding>> verify(const InputFile& file, const Index& index);
+Result<std::vector<Finding>> verify(const InputFile& file, const Index& index, const std::stop_token& stop);
 
 }  // namespace jostle::bags::mcap

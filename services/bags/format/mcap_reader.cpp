@@ -116,7 +116,7 @@ class McapReader final : public FileReader {
     return read_attachment(file_, index_.attachments.at(index));
   }
 
-  Result<std::vector<Finding>> verify() override { return mcap::verify(file_, index_); }
+  Result<std::vector<Finding>> verify() override { return mcap::verify(file_, index_, options_.stop); }
 
  private:
   struct Cursor {

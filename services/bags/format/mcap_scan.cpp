@@ -26,9 +26,10 @@ class Scan {
   Scan(const InputFile& file, std::uint64_t end, ScanMode mode, Index& index, Census& census)
       : file_(file), end_(end), mode_(mode), index_(index), census_(census) {}
 
-  Result<void> run() {
+  Result<void> run(const std::stop_token& stop) {
     std::uint64_t at = kMagic.size();
     while (at < end_) {
+      if (stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
       auto next_result = take_next(at);
       if (!next_result && recovers()) next_result = search(at, next_result.error());
       if (!next_result) return next_result.error();
@@ -395,9 +396,10 @@ class Scan {
 
 }  // namespace
 
-Result<void> scan(const InputFile& file, std::uint64_t end, ScanMode mode, Index& index, Census& census) {
+Result<void> scan(const InputFile& file, std::uint64_t end, ScanMode mode, Index& index, Census& census,
+                  const std::stop_token& stop) {
   index.was_scanned = true;
-  return Scan(file, end, mode, index, census).run();
+  return Scan(file, end, mode, index, census).run(stop);
 }
 
 }  // namespace jostle::bags::mcap

@@ -3,6 +3,7 @@
 /// An index made of all records of an MCAP file, for want of a summary that says all, or to check one.
 
 #include <cstdint>
+#include <stop_token>
 
 #include "idl/types/result.hpp"
 #include "services/bags/format/input_file.hpp"
@@ -19,6 +20,8 @@ enum class ScanMode {
 /// Finds blocks, notes and attachments anew; definitions are added to those that `index` has from its summary. Notes
 /// among FileInfo::findings whatever cannot be taken. `end`: where the footer is, or where a file without one ends.
 /// `census`: takes what was met.
-Result<void> scan(const InputFile& file, std::uint64_t end, ScanMode mode, Index& index, Census& census);
+/// Error kCancelled once `stop` is requested, whatever the mode.
+Result<void> scan(const InputFile& file, std::uint64_t end, ScanMode mode, Index& index, Census& census,
+                  const std::stop_token& stop);
 
 }  // namespace jostle::bags::mcap

@@ -141,10 +141,10 @@ class Comparison {
 
 }  // namespace
 
-Result<std::vector<Finding>> verify(const InputFile& file, const Index& index) {
+Result<std::vector<Finding>> verify(const InputFile& file, const Index& index, const std::stop_token& stop) {
   Index found{.definitions = index.definitions.of_summary(), .notes_replace = index.notes_replace};
   Census census;
-  if (auto ok = scan(file, index.data_end, ScanMode::kVerify, found, census); !ok) return ok.error();
+  if (auto ok = scan(file, index.data_end, ScanMode::kVerify, found, census, stop); !ok) return ok.error();
   if (index.summary) Comparison(file, *index.summary, census, found.definitions, found.info.findings).make();
   return found.info.findings.list();
 }

@@ -47,7 +47,7 @@ std::string metadata_text(const BagMetadata& metadata) {
     out << YAML::BeginMap << YAML::Key << "topic_metadata" << YAML::Value << YAML::BeginMap;
     out << YAML::Key << "name" << YAML::Value << topic.topic.name;
     out << YAML::Key << "type" << YAML::Value << topic.topic.type;
-    out << YAML::Key << "serialization_format" << YAML::Value << "cdr";
+    out << YAML::Key << "serialization_format" << YAML::Value << topic.topic.encoding;
     out << YAML::Key << "offered_qos_profiles" << YAML::Value << YAML::DoubleQuoted << qos_text(topic.topic.qos);
     out << YAML::EndMap << YAML::Key << "message_count" << YAML::Value << topic.messages << YAML::EndMap;
   }

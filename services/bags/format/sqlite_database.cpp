@@ -7,6 +7,8 @@
 #include <fstream>
 #include <optional>
 
+#include "services/common/process/files.hpp"
+
 namespace jostle::bags {
 namespace {
 
@@ -55,9 +57,11 @@ std::string immutable_uri(const std::filesystem::path& file) {
   return uri + "?immutable=1";
 }
 
+constexpr std::array kJournals{"-wal", "-journal"};
+
 // Whether a journal beside a file holds what the file lacks.
 bool has_journal(const std::filesystem::path& file) {
-  for (const char* ending : {"-wal", "-journal"}) {
+  for (const char* ending : kJournals) {
     std::error_code problem;
     const auto size = std::filesystem::file_size(file.string() + ending, problem);
     if (!problem && size > 0) return true;
@@ -123,11 +127,36 @@ Result<Database> Database::open(const std::filesystem::path& file, bool recover)
   // What lies behind the last page is no loss.
   const std::uint64_t size = std::filesystem::file_size(file, problem);
   const auto [page, count] = pages_of(file);
-  if (page > 0 && size % page != 0 && (count == 0 || size < count * page)) {
-    return Error{Code::kInvalidArgument, fmt::format("{}: byte {}: cut off within a page of {} bytes; remedy: truncate "
-                                                     "--size={} a copy of it, and jostle bag recover that",
-                                                     file.string(), size, page, size / page * page)};
+  const bool is_cut = page > 0 && size % page != 0 && (count == 0 || size < count * page);
+  if (!is_cut) return open_as_it_is(file, recover);
+  if (recover) return open_whole_pages(file, size / page * page);
+  return Error{Code::kInvalidArgument, fmt::format("{}: byte {}: cut off within a page of {} bytes; remedy: jostle bag "
+                                                   "recover saves what is readable",
+                                                   file.string(), size, page)};
+}
+
+// A copy without the half page, which lives as long as it is open; journals beside it come along.
+Result<Database> Database::open_whole_pages(const std::filesystem::path& file, std::uint64_t size) {
+  auto folder_result = common::make_temporary_folder("bag");
+  if (!folder_result) return folder_result.error();
+  const std::filesystem::path copy = *folder_result / "copy.db3";
+  std::error_code problem, ignored;
+  std::filesystem::copy_file(file, copy, problem);
+  if (!problem) std::filesystem::resize_file(copy, size, problem);
+  for (const char* ending : kJournals) {
+    std::filesystem::copy_file(file.string() + ending, copy.string() + ending, ignored);
   }
+  Result<Database> database_result =
+      problem ? Error{Code::kIo, fmt::format("{}: a copy of it for recovering: {}", file.string(), problem.message())}
+              : open_as_it_is(copy, true);
+  std::filesystem::remove_all(*folder_result, ignored);
+  if (!database_result) return database_result;
+  database_result->file_ = file;
+  database_result->was_cut_ = true;
+  return database_result;
+}
+
+Result<Database> Database::open_as_it_is(const std::filesystem::path& file, bool recover) {
   struct Way {
     int flags;
     bool is_whole;

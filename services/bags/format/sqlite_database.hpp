@@ -66,8 +66,8 @@ class Database {
   static Result<Database> create(const std::filesystem::path& file);
   /// Opens a database that is there. Rolls back what a killed writer has left half done, as every program
   /// that opens it does. One with a journal of writes (WAL) in a folder that cannot be written to is opened if that
-  /// journal has nothing that the database lacks. `recover`: also opens one whose last pages are missing,
-  /// unless a page is cut in two.
+  /// journal has nothing that the database lacks. `recover`: also opens one whose last pages are missing;
+  /// if a page is cut in two, a copy without it.
   static Result<Database> open(const std::filesystem::path& file, bool recover);
 
   Result<void> run(const std::string& sql);
@@ -82,15 +82,19 @@ class Database {
   void close() { database_.reset(); }
 
   const std::filesystem::path& path() const { return file_; }
+  bool was_cut() const { return was_cut_; }  ///< within a page, which is left out
 
  private:
   struct Close {
     void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
   };
+  static Result<Database> open_as_it_is(const std::filesystem::path& file, bool recover);
+  static Result<Database> open_whole_pages(const std::filesystem::path& file, std::uint64_t size);
   static Result<Database> connect(const std::filesystem::path& file, int flags, bool is_whole);
 
   std::filesystem::path file_;
   std::unique_ptr<sqlite3, Close> database_;
+  bool was_cut_ = false;
 };
 
 }  // namespace jostle::bags

@@ -22,6 +22,9 @@ class SqliteReader final : public FileReader {
   SqliteReader(Database database, const OpenOptions& options) : database_(std::move(database)), options_(options) {}
 
   Result<void> open() {
+    if (database_.was_cut()) {
+      info_.findings.lost(Part::kRecord, "cut off within a page", database_.path().string());
+    }
     if (auto ok = check_version(); !ok) return ok;
     if (auto ok = read_topics(); !ok && !stepped_over(Part::kTopic, ok.error())) return ok;
     spans_.resize(ids_.size());
@@ -249,6 +252,7 @@ class SqliteReader final : public FileReader {
     for (;;) {
       const std::int64_t before = last;
       const auto end = count_from(last);
+      if (options_.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
       if (last > before) stretches_.emplace_back(before, last);
       if (end) return {};
       const auto next = next_readable(last);
@@ -273,7 +277,7 @@ class SqliteReader final : public FileReader {
     if (!rows_result) return rows_result.error();
     rows_result->bind(1, last);
     Result<bool> row = true;
-    while ((row = rows_result->step()) && *row) {
+    while (!options_.stop.stop_requested() && (row = rows_result->step()) && *row) {
       last = rows_result->number(3);
       if (is_sound(*rows_result)) {
         add(rows_result->number(0), 1, rows_result->number(1), rows_result->number(1));

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -68,6 +69,7 @@ struct OpenOptions {
   bool skip_repeated = false;  ///< leave out what repeats earlier files
   /// Take what is readable; FileInfo::findings say what is not. next() steps over damage, too.
   bool recover = false;
+  std::stop_token stop;  ///< ends a long look at a whole file with kCancelled
 };
 
 /// A file that is being read; messages have the file's own topic indices.

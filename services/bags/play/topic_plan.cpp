@@ -125,9 +125,14 @@ Result<TopicPlan> plan_topics(const BagInfo& bag, const TopicChoice& choice) {
     }
     const auto [known, is_new] = types.try_emplace(name, topic.type);
     if (!is_new && known->second != topic.type) {
-      return Error{Code::kInvalidArgument,
-                   fmt::format("{}: got types {} and {}, wanted one; remedy: leave out one, or --remap", name,
-                               known->second, topic.type)};
+      // The user's own doing, or the bag's.
+      if (name != topic.name) {
+        return Error{Code::kInvalidArgument,
+                     fmt::format("--remap: {}: got types {} and {}, wanted one", name, known->second, topic.type)};
+      }
+      plan.impossible.push_back(fmt::format("{}: got a second type {}, played is {}; remedy: --remap", topic.name,
+                                            topic.type, known->second));
+      continue;
     }
     plan.played.push_back({.topic = static_cast<int>(i),
                            .name = name,

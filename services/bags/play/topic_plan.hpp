@@ -45,7 +45,8 @@ bool commands_somebody(const Topic& topic);
 
 /// Plans to play all topics that the choice selects, but for those that command somebody: they are played only if
 /// a glob without wildcards or a remap names them.
-/// Errors   kInvalidArgument  nothing is left, a remap of a topic that is not there, two types on one topic
+/// Errors   kInvalidArgument  nothing is left, a remap of a topic that is not there, or onto one of
+///                            another type; a second type that the bag has on a topic is left out
 Result<TopicPlan> plan_topics(const BagInfo& bag, const TopicChoice& choice);
 
 }  // namespace jostle::bags

@@ -45,6 +45,7 @@ Result<RunCurves> curves_of(BagReader& reader, const RecordedRun& run) {
   const RecordedMotion& motion = *motion_result;
 
   RunCurves curves{.task = geometry.kind->name, .has_goal = geometry.kind->has_goal, .cost = cost_of(run, motion)};
+  curves.unreadable = motion.unreadable();
   const double step = motion.duration() / kPoints;
   std::optional<State> before;
   for (int i = 0; i <= kPoints; ++i) {

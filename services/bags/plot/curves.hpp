@@ -18,12 +18,13 @@ struct Curve {
 };
 
 struct RunCurves {
-  std::string task;       ///< as scenes name it
-  bool has_goal = false;  ///< distances are those to a goal; else to the hand
-  Curve cost;             ///< of the plan that is being executed; each holds until the next one
-  Curve distance;         ///< m, as the task measures how far it is from its end
-  Curve hand_speed;       ///< m/s, of the hand's frame
-  Curve target_speed;     ///< m/s, of the target's centre
+  std::string task;              ///< as scenes name it
+  bool has_goal = false;         ///< distances are those to a goal; else to the hand
+  Curve cost;                    ///< of the plan that is being executed; each holds until the next one
+  Curve distance;                ///< m, as the task measures how far it is from its end
+  Curve hand_speed;              ///< m/s, of the hand's frame
+  std::uint64_t unreadable = 0;  ///< states of the bag that cannot be read
+  Curve target_speed;            ///< m/s, of the target's centre
 };
 
 /// Makes the curves of a run.

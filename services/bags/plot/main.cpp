@@ -76,6 +76,9 @@ int plot(const fs::path& bag, const fs::path& picture, const std::string& goal) 
   if (!run_result) return fail(run_result.error());
   const auto curves_result = curves_of(**reader_result, *run_result);
   if (!curves_result) return fail(curves_result.error());
+  if (curves_result->unreadable > 0) {
+    fmt::print(stderr, "jostle bag plot: {} states of the bag cannot be read\n", curves_result->unreadable);
+  }
   if (auto ok = common::plot(picture, title_of(*run_result, *curves_result), panels_of(*curves_result)); !ok) {
     return fail(ok.error());
   }

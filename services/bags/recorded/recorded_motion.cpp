@@ -30,7 +30,9 @@ std::vector<int> topics_of_type(const BagInfo& info, const std::string& type) {
   return topics;
 }
 
-Result<std::vector<Moment>> follow_states(BagReader& reader, const RecordedRun& run, const StateLayout& layout) {
+// `unreadable`: counts states that are no longer, or not yet, what their type says.
+Result<std::vector<Moment>> follow_states(BagReader& reader, const RecordedRun& run, const StateLayout& layout,
+                                          std::uint64_t& unreadable) {
   const auto objects_topics = topics_of_type(reader.info(), "jostle_msgs/msg/ObjectStates");
   auto topics = topics_of_type(reader.info(), "jostle_msgs/msg/RobotStatus");
   std::vector<Moment> moments;
@@ -45,14 +47,20 @@ Result<std::vector<Moment>> follow_states(BagReader& reader, const RecordedRun& 
     const Message& message = **message_result;
     if (std::ranges::find(objects_topics, message.topic) != objects_topics.end()) {
       auto states_result = wire::from_cdr<ObjectStates>(message.data);
-      if (!states_result) return states_result.error();
+      if (!states_result) {
+        ++unreadable;
+        continue;
+      }
       auto readings_result = world::from_message(*states_result);
       if (!readings_result) return readings_result.error();
       objects = std::move(readings_result).value();
       continue;
     }
     auto status_result = wire::from_cdr<RobotStatus>(message.data);
-    if (!status_result) return status_result.error();
+    if (!status_result) {
+      ++unreadable;
+      continue;
+    }
     auto reading_result = world::from_message(*status_result);
     if (!reading_result) return reading_result.error();
     if (!objects) continue;  // a world sends its objects before its robot's status
@@ -102,7 +110,8 @@ State between(const StateLayout& layout, const State& a, const State& b, double 
 
 Result<RecordedMotion> RecordedMotion::read(BagReader& reader, const RecordedRun& run, const StateLayout& layout,
                                             RunClock clock) {
-  auto moments_result = follow_states(reader, run, layout);
+  std::uint64_t unreadable = 0;
+  auto moments_result = follow_states(reader, run, layout, unreadable);
   if (moments_result && moments_result->empty()) moments_result = follow_observations(run, layout);
   if (!moments_result) {
     return Error{moments_result.error().code,
@@ -121,7 +130,7 @@ Result<RecordedMotion> RecordedMotion::read(BagReader& reader, const RecordedRun
     else
       samples.push_back(std::move(sample));
   }
-  return RecordedMotion(std::move(samples), layout, first.world);
+  return RecordedMotion(std::move(samples), layout, first.world, unreadable);
 }
 
 RecordedMotion::Sample RecordedMotion::at(double time) const {

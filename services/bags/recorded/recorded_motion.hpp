@@ -2,6 +2,7 @@
 /// \file
 /// RecordedMotion: where everything was, at any time of a recorded run.
 
+#include <cstdint>
 #include <vector>
 
 #include "idl/types/result.hpp"
@@ -26,12 +27,13 @@ class RecordedMotion {
   };
 
   /// Reads the robot's and the objects' states from a bag; the run's observations where
-  /// the bag has no states.
+  /// the bag has no states, or none that can be read.
   /// Errors   kInvalidArgument  a state that does not fit the scene; those of BagReader
   static Result<RecordedMotion> read(BagReader& reader, const RecordedRun& run, const StateLayout& layout,
                                      RunClock clock);
 
   double duration() const { return samples_.back().time; }  ///< s
+  std::uint64_t unreadable() const { return unreadable_; }  ///< states in the bag that cannot be read
   double world_begin() const { return world_begin_; }       ///< s of the world's clock, at the first sample
 
   /// Interpolates: between two samples positions go straight and rotations turn evenly. Before the
@@ -39,12 +41,13 @@ class RecordedMotion {
   Sample at(double time) const;
 
  private:
-  RecordedMotion(std::vector<Sample> samples, StateLayout layout, double world_begin)
-      : samples_(std::move(samples)), layout_(std::move(layout)), world_begin_(world_begin) {}
+  RecordedMotion(std::vector<Sample> samples, StateLayout layout, double world_begin, std::uint64_t unreadable)
+      : samples_(std::move(samples)), layout_(std::move(layout)), world_begin_(world_begin), unreadable_(unreadable) {}
 
   std::vector<Sample> samples_;  // times go up; at least one
   StateLayout layout_;
   double world_begin_;  // s
+  std::uint64_t unreadable_;
 };
 
 }  // namespace jostle::bags

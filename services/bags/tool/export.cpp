@@ -9,7 +9,7 @@
 #include <set>
 #include <unordered_map>
 
-#include "services/bags/format/bag_reader.hpp"
+#include "services/bags/format/folder_reader.hpp"
 #include "services/bags/tool/commands.hpp"
 #include "services/bags/tool/decoders.hpp"
 #include "services/common/process/program.hpp"
@@ -333,7 +333,7 @@ Result<void> export_csv(BagReader& reader, const Decoders& decoders, const Selec
 }  // namespace
 
 int export_bag(const ExportArguments& arguments, std::stop_token stop) {
-  const auto reader_result = BagReader::open(arguments.bag);
+  const auto reader_result = open_bag(arguments.bag, false, stop);
   if (!reader_result) return fail(reader_result.error(), common::kExitUsage);
   if ((*reader_result)->info().messages == 0) tell("got no messages that can be exported");
   const Decoders decoders((*reader_result)->info());

@@ -100,7 +100,7 @@ std::string counts_of(const Findings& findings) {
 }  // namespace
 
 int recover_bag(const RecoverArguments& arguments, std::stop_token stop) {
-  auto reader_result = open_bag(arguments.bag, true);
+  auto reader_result = open_bag(arguments.bag, true, stop);
   if (!reader_result) return fail(reader_result.error(), common::kExitFailed);
   CheckedReader& reader = **reader_result;
   const fs::path output = arguments.output.empty() ? default_output(arguments.bag) : arguments.output;

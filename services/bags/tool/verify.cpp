@@ -55,7 +55,7 @@ bool is_harmless(const Finding& finding) { return finding.part == Part::kUnknown
 }  // namespace
 
 int verify_bag(const std::filesystem::path& bag, std::stop_token stop) {
-  const auto reader_result = open_bag(bag, false);
+  const auto reader_result = open_bag(bag, false, stop);
   if (!reader_result) return fail(reader_result.error(), common::kExitFailed);
   CheckedReader& reader = **reader_result;
   const BagInfo& info = reader.info();

@@ -124,6 +124,13 @@ TEST(TopicPlan, KnowsNamesOfTheWireAndShortOnes) {
   EXPECT_THAT(plan.impossible, ElementsAre(HasSubstr("/log: its type foxglove.Log")));
 }
 
+TEST(TopicPlan, LeavesOutASecondTypeOfATopic) {
+  const auto plan =
+      taken(plan_topics(bag_of({typed("/x", "std_msgs/msg/String"), typed("/x", "std_msgs/msg/Int8")}), {}));
+  EXPECT_THAT(names(plan), ElementsAre("/x"));
+  EXPECT_THAT(plan.impossible, ElementsAre(HasSubstr("/x: got a second type std_msgs/msg/Int8")));
+}
+
 TEST(TopicPlan, LeavesOutWhatIsNotCdr) {
   auto topics = std::vector{typed("/x", "std_msgs/msg/String"), typed("/log", "std_msgs/msg/String")};
   topics[1].encoding = "json";

@@ -22,10 +22,11 @@ endfunction()
 # All programs, without the tests.
 add_custom_target(programs)
 
-# jostle_program(NAME SOURCES … LINK … [COMPONENT …]): build/bin/jostle_NAME. It is
-# installed beside the launcher, in the package of COMPONENT (jostle, see deploy/).
+# jostle_program(NAME SOURCES … LINK … [COMPONENT …] [INTERNAL]): build/bin/jostle_NAME. It is
+# installed beside the launcher, in the package of COMPONENT (jostle, see deploy/). INTERNAL: another program starts it,
+# and no user does.
 function(jostle_program name)
-  cmake_parse_arguments(ARG "" "COMPONENT" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "INTERNAL" "COMPONENT" "SOURCES;LINK" ${ARGN})
   add_executable(jostle_${name} ${ARG_SOURCES})
   target_link_libraries(jostle_${name} PRIVATE jostle_flags ${ARG_LINK})
   add_dependencies(programs jostle_${name})
@@ -33,5 +34,7 @@ function(jostle_program name)
     set(ARG_COMPONENT jostle)
   endif()
   install(TARGETS jostle_${name} DESTINATION ${JOSTLE_PROGRAMS} COMPONENT ${ARG_COMPONENT})
-  set_property(GLOBAL APPEND PROPERTY JOSTLE_${ARG_COMPONENT}_PROGRAMS ${name})  # deploy/ makes their manual pages
+  if(NOT ARG_INTERNAL)
+    set_property(GLOBAL APPEND PROPERTY JOSTLE_${ARG_COMPONENT}_PROGRAMS ${name})  # deploy/ makes their manual pages
+  endif()
 endfunction()

@@ -4,15 +4,18 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <random>
 #include <vector>
 
 #include "services/wire/limits.hpp"
+#include "tests/fuzz/wire/mutation.hpp"
 
 namespace jostle::wire {
 namespace {
 
 using namespace std::chrono_literals;
-using Bytes = std::vector<std::uint8_t>;
+using tests::Bytes;
 
 void append(Bytes& bytes, std::uint64_t number, int size) {
   for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(number >> (8 * i)));
@@ -182,6 +185,21 @@ TEST_F(Datagrams, WithFragmentsOfGiantsAreDropped) {
   EXPECT_EQ(judge(fragments(65000, UINT32_MAX)), Flaw::kFragments);
   EXPECT_EQ(judge(fragments(4, 200'000'000)), Flaw::kFragments);
   EXPECT_EQ(judge(fragments(0, 1000)), Flaw::kFragments);
+}
+
+// For the sanitizers: what is read lies in the datagram.
+TEST_F(Datagrams, ThatAreSpoiltInAnyWayAreJudged) {
+  std::mt19937_64 random(1);
+  Bytes whole = header();
+  for (const Bytes& part : {heartbeat(1, 5), data(3), gap(1, 2), fragments(1000, 5000), statistics()}) whole += part;
+  std::map<Flaw, int> judged;
+  for (int i = 0; i < 100'000; ++i) {
+    const Bytes spoilt = tests::mutated(whole, random() % 4 == 0 ? 0 : 20, random);
+    ++judged[sut.judge(std::vector<std::uint8_t>(spoilt), now)];
+  }
+  for (const Flaw flaw : {Flaw::kNone, Flaw::kMalformed, Flaw::kStatistics, Flaw::kNumber, Flaw::kFragments}) {
+    EXPECT_GT(judged[flaw], 0) << to_string(flaw);
+  }
 }
 
 TEST_F(Datagrams, OfCountlessWritersTakeNoMemoryForEver) {

@@ -71,7 +71,8 @@ Result<jostle_msgs::msg::GoalResult> follow(GoalClient& client, common::LiveLine
 }
 
 int perform(const RunOptions& options, double patience, std::stop_token stop) {
-  auto participant_result = wire::Participant::open({.name = "jostle_goal", .domain = options.domain, .role = wire::Role::kRobot});
+  auto participant_result =
+      wire::Participant::open({.name = "jostle_goal", .domain = options.domain, .role = wire::Role::kRobot});
   if (!participant_result) return fail(participant_result.error(), common::kExitUsage);
   common::LiveLine line("jostle goal", options.headless ? common::PlainLines::kAlways : common::PlainLines::kElsewhere);
   Display display(line);

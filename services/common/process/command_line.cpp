@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <regex>
 #include <sstream>
@@ -241,14 +242,27 @@ const CLI::Option* next_positional(const CLI::App& app, int given) {
 
 // --- manual pages -------------------------------------------------------------
 
+// A character beyond ASCII, whose UTF-8 begins at `at`, as roff names it; `at` goes to its last byte.
+std::string roff_name(const std::string& text, std::size_t& at) {
+  const auto first = static_cast<unsigned char>(text[at]);
+  const int more = first >= 0xF0 ? 3 : first >= 0xE0 ? 2 : 1;
+  std::uint32_t code = first & (0x3Fu >> more);
+  for (int i = 0; i < more && at + 1 < text.size(); ++i)
+    code = code << 6 | (static_cast<unsigned char>(text[++at]) & 0x3Fu);
+  return fmt::format("\\[u{:04X}]", code);
+}
+
 // A line of text, in which nothing is a macro.
 std::string plain(const std::string& text) {
   std::string escaped;
-  for (const char c : text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
     if (c == '\\') {
       escaped += "\\e";
     } else if (c == '-') {
       escaped += "\\-";
+    } else if (static_cast<unsigned char>(c) >= 0xC0) {
+      escaped += roff_name(text, i);
     } else {
       escaped += c;
     }

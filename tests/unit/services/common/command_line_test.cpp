@@ -30,7 +30,7 @@ class CommandLine : public testing::Test {
  protected:
   CommandLine() {
     app.add_option("scene", scene, "Scene file")->required();
-    auto* controller = app.add_option("--controller", word, "Which one;\nall of them");
+    auto* controller = app.add_option("--controller", word, "Which one \xE2\x80\xA6;\nall of them");
     suggest(controller, {"or", "nr", "mpc"});
     app.add_option("--pool", word, "Where")->check(CLI::IsMember({"dds", "threads"}));
     add_count_option(app, "--workers", count, 0, "How many");
@@ -123,7 +123,7 @@ TEST_F(CommandLine, CompletesSubcommandsOptionsValuesAndFiles) {
   EXPECT_THAT(completions(bag, {"export", "--"}), Contains("--csv\ta table"));
   EXPECT_THAT(completions(bag, {"info", "--"}), Not(Contains(StartsWith("--csv"))));
   EXPECT_THAT(completions(app, {""}), ElementsAre(":files"));
-  EXPECT_THAT(completions(app, {"--"}), Contains("--controller\tWhich one;"));
+  EXPECT_THAT(completions(app, {"--"}), Contains(StartsWith("--controller\tWhich one")));
   EXPECT_THAT(completions(app, {"--"}), Not(Contains(StartsWith("--inner"))));
   EXPECT_THAT(completions(app, {"--controller", ""}), ElementsAre("or", "nr", "mpc"));
   EXPECT_THAT(completions(app, {"--pool", ""}), ElementsAre("dds", "threads"));
@@ -136,8 +136,9 @@ TEST_F(CommandLine, CompletesSubcommandsOptionsValuesAndFiles) {
 TEST_F(CommandLine, ManualPageHasEveryOptionAndSubcommand) {
   const std::string page = manual_page(app, "plan a scene");
   EXPECT_THAT(page, StartsWith(".TH JOSTLE-RUN 1"));
-  for (const char* part : {"jostle\\-run \\- plan a scene", "\\fB\\-\\-controller\\fR", "\\fIdds|threads\\fR",
-                           "Default: 1.", ".SH EXIT STATUS\n0 done, 1 not.", "jostle run x.yaml"})
+  for (const char* part :
+       {"jostle\\-run \\- plan a scene", "\\fB\\-\\-controller\\fR", "\\fIdds|threads\\fR", "Which one \\[u2026];",
+        "Default: 1.", ".SH EXIT STATUS\n0 done, 1 not.", "jostle run x.yaml"})
     EXPECT_THAT(page, HasSubstr(part));
   EXPECT_THAT(page, Not(HasSubstr("inner")));
   const std::string bags = manual_page(bag, "look into bags");

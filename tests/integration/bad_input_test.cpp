@@ -223,8 +223,8 @@ TEST_F(Stranger, TakesTheRobotFromNobodyWhoIsThere) {
 
   send(wire::topics::kRobotCommand, 1, command);
 
-  expect_named_and_survived(
-      "sim.log", fmt::format("a command of participant {:016x} was dropped: the robot obeys", participant.id()));
+  expect_named_and_survived("sim.log",
+                            fmt::format("a command of participant {:016x} waits: the robot obeys", participant.id()));
 }
 
 }  // namespace

@@ -44,7 +44,8 @@ TEST_F(Workers, AreListedWithWhatTheyAre) {
     const bool is_one = worker["name"] == "one";
     EXPECT_EQ(worker["pid"], is_one ? one->pid() : other->pid());
     EXPECT_EQ(worker["threads"], is_one ? 2 : 1);
-    if (!is_one) EXPECT_EQ(worker["name"], fmt::format("{}-{}", worker["host"].get<std::string>(), other->pid()));
+    const std::string own = fmt::format("{}-{}", worker["host"].get<std::string>(), worker["pid"].get<pid_t>());
+    EXPECT_EQ(worker["name"], is_one ? "one" : own);
     EXPECT_EQ(worker["busy"], 0);
     EXPECT_GE(worker["host_load"], 0.0);
     EXPECT_THAT(worker["version"].get<std::string>(), HasSubstr("Jostle "));

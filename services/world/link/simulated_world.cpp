@@ -110,6 +110,8 @@ void SimulatedWorld::make_wait(Letter letter) {
     return;
   }
   if (newcomers_.size() >= wire::limits::kSendersPerInbox) newcomers_.pop_front();
+  foreign_.note("a command of participant {:016x} waits: the robot obeys participant {:016x}, which is there",
+                letter.writer, *commander_);
   newcomers_.push_back({std::move(letter), steady_clock::now()});
 }
 

@@ -53,13 +53,13 @@ class Scan {
     if (record.op == Op::kChunk) has_chunks_ = true;
     if (is_of_blocks(record.op)) return take_run(record);
     if (static_cast<std::uint8_t>(record.op) == 0) return file_.damaged(at, "got opcode 0, wanted a record");
-    if (record.op == Op::kFooter) return take_footer(record);
     if (recovers() && record.op == Op::kChunk && !chunk_at(record)) return take_odd_chunk(record);
     // Whatever is wrong in it, if its length is right it goes on behind it.
     const bool is_known = record.op <= Op::kDataEnd;
     if (recovers() && (is_known ? !is_plausible(record.op, record.size) : !goes_on(record.end()))) {
       return file_.damaged(at, "got a record whose length does not fit its kind");
     }
+    if (record.op == Op::kFooter) return take_footer(record);
     if (!is_known) {
       index_.info.findings.lost(Part::kUnknownRecord, fmt::format("of kind {:#04x}", static_cast<unsigned>(record.op)),
                                 where(at));

@@ -62,7 +62,9 @@ Share wilson_interval(int successes, int runs) {
 }
 
 std::string number_text(double value, int digits) {
-  return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : "-";
+  if (!std::isfinite(value)) return "-";
+  const bool is_lost = value != 0 && std::abs(value) < 0.5 * std::pow(10, -digits);  // would be written as 0
+  return is_lost ? fmt::format("{:.1g}", value) : fmt::format("{:.{}f}", value, digits);
 }
 
 std::string to_text(const Mean& mean, int digits) {

@@ -44,7 +44,8 @@ struct Share {
 };
 Share wilson_interval(int successes, int runs);
 
-/// Writes a number with so many digits after the point; "-" if there is none.
+/// Writes a number with so many digits after the point, or its first digit if none of these is another than 0; "-" if
+/// there is no number.
 std::string number_text(double value, int digits);
 
 /// Writes "12.3 ± 0.4", or "12.3" without an interval, or "-".

@@ -271,18 +271,31 @@ class Study {
   }
 
   Result<void> measure_speed(const Task& task, int objects) {
-    for (int repeat = -1; repeat < options_.repeats; ++repeat) {  // the first warms up
+    for (const Lever& lever : options_.levers) {
+      if (auto ok = warm_up(task, lever.options); !ok) return ok;
+    }
+    for (int repeat = 0; repeat < options_.repeats; ++repeat) {
       double plain = 0.0;
       for (std::size_t i = 0; i < options_.levers.size(); ++i) {
         auto speed_result = speed(pool_, task, options_.levers[i].options, options_, stop_);
         if (!speed_result) return speed_result.error();
         if (i == 0) plain = *speed_result;
-        if (repeat < 0) continue;
         results_.of(i, objects).ratios.push_back(*speed_result / plain);
         step(objects);
       }
-      if (repeat < 0) tell("{:>2} objects, world {}: {:.1f} candidates/s with full physics", objects, task.seed, plain);
+      tell("{} objects, world {}: {:.1f} candidates/s with full physics", objects, task.seed, plain);
     }
+    return {};
+  }
+
+  // What the first rollouts in a world pay for once, nobody should: each thread gets one, or a few where they are
+  // screened.
+  Result<void> warm_up(const Task& task, PbstoOptions brief) {
+    brief.rollouts = static_cast<int>(pool_.status().workers.size());
+    CheapPhysicsOptions once = options_;
+    once.iterations = 1;
+    auto speed_result = speed(pool_, task, brief, once, stop_);
+    if (!speed_result) return speed_result.error();
     return {};
   }
 
@@ -422,8 +435,9 @@ std::string to_text(const CheapPhysics& results) {
     if (r.ratios.size() > 1) ratio += fmt::format(" ({:.2f} .. {:.2f})", interval.low, interval.high);
     if (!r.ratios.empty() || !r.correlations.empty() || !r.pose_errors.empty()) {
       speed.push_back({r.name, std::to_string(r.objects), ratio, common::number_text(common::median(r.correlations), 2),
-                       common::number_text(1e3 * common::median(r.pose_errors), 2) + ", " +
-                           common::number_text(1e3 * common::quantile(r.pose_errors, 0.9), 1)});
+                       r.pose_errors.empty() ? "-"
+                                             : fmt::format("{:.2f}, {:.1f}", 1e3 * common::median(r.pose_errors),
+                                                           1e3 * common::quantile(r.pose_errors, 0.9))});
     }
     if (r.worlds == 0) continue;
     const common::Share share = common::wilson_interval(r.executed, r.worlds);

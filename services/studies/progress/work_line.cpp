@@ -51,10 +51,8 @@ void WorkLine::end() {
 
 void WorkLine::expect(std::size_t more, double work) {
   const std::lock_guard lock(mutex_);
-  const bool first = state_.total == 0;
   state_.total += more;
   state_.work_left += static_cast<double>(more) * work;
-  draw(first);
 }
 
 void WorkLine::skip(std::size_t found) {

@@ -27,7 +27,7 @@ struct WorkState {
 std::string work_text(const std::string& unit, const WorkState& state);
 
 /// A WorkLine shows work_text() and the latest news on standard error: on a terminal as one line that is drawn over
-/// every second, elsewhere as a line at the beginning and every half minute. On a terminal it is gone at the end.
+/// every second, elsewhere as a line after the first second and every half minute. On a terminal it is gone at the end.
 ///
 /// Threads  safe from any; one of its own draws.
 class WorkLine {

@@ -82,6 +82,9 @@ TEST(ToText, ShowsNoNumberWhereThereIsNone) {
   EXPECT_EQ(to_text(mean_of({4.0}), 2), "4.00");
   EXPECT_EQ(to_text(mean_of({}), 2), "-");
   EXPECT_EQ(number_text(kNone, 1), "-");
+  EXPECT_EQ(number_text(0.0, 2), "0.00");
+  EXPECT_EQ(number_text(-0.0024, 2), "-0.002");  // what was measured is not 0
+  EXPECT_EQ(number_text(0.006, 2), "0.01");
   EXPECT_EQ(number_text(HUGE_VAL, 1), "-");
   EXPECT_EQ(interval_text(0.25, 0.5), "0.25 to 0.50");
   EXPECT_EQ(interval_text(kNone, kNone), "-");

@@ -119,8 +119,9 @@ std::string to_text(const Measurement& measurement) {
   const common::Interval interval = measurement.interval();
   const double ratio = measurement.ratio();
   const bool is_whole = std::ssize(measurement.a) == measurement.wanted;
-  const std::string repeats = is_whole ? fmt::format("{} repeat{}", measurement.wanted, measurement.wanted == 1 ? "" : "s")
-                                       : fmt::format("{} of {} repeats", measurement.a.size(), measurement.wanted);
+  const std::string repeats = is_whole
+                                  ? fmt::format("{} repeat{}", measurement.wanted, measurement.wanted == 1 ? "" : "s")
+                                  : fmt::format("{} of {} repeats", measurement.a.size(), measurement.wanted);
   const std::string range =
       measurement.a.size() > 1 ? fmt::format("{:.3f} .. {:.3f}, ", interval.low, interval.high) : "";
   std::string text =

@@ -23,8 +23,8 @@ using eprosima::fastdds::dds::DomainParticipantFactory;
 using eprosima::fastdds::dds::DomainParticipantQos;
 using Listener = eprosima::fastdds::dds::DomainParticipantListener;
 
-// Keeps the directory, and knows who came with an identity, who of them was let in or turned away, and who came without.
-// Endpoints are the watch's.
+// Keeps the directory, and knows who came with an identity, who of them was let in or turned away, and who came
+// without. Endpoints are the watch's.
 class Guest final : public Doorkeeper {
  public:
   Guest(std::shared_ptr<EndpointWatch> watch, bool is_protected) : watch_(std::move(watch)), protected_(is_protected) {}

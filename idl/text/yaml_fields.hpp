@@ -214,7 +214,9 @@ class Fields {
       if (!node.IsMap()) return unwanted(node, field, wanted<T>());
       for (const auto& entry : node) {
         const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "?";
-        read(entry.second, field + "." + key, value[key]);
+        std::string name = field;
+        name.append(".").append(key);
+        read(entry.second, name, value[key]);
       }
     } else {
       if (!node.IsSequence()) return unwanted(node, field, wanted<T>());

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 namespace jostle::planners {
@@ -41,6 +42,8 @@ RolloutBatch Search::around(const ControlSequence& nominal) const {
 }
 
 Result<BatchReply> Search::run(const RolloutBatch& batch) {
+  // A pool may be done before it looks at the time.
+  if (std::chrono::steady_clock::now() >= deadline_) return Error{Code::kDeadline, "plan: out of time"};
   best_.rollouts += batch.samples;
   if (problem_.rollouts_asked_for) *problem_.rollouts_asked_for += batch.samples;
   auto reply_result = pool_.run(batch, deadline_, stop_);

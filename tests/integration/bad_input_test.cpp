@@ -147,7 +147,8 @@ TEST_F(BadInput, ParametersAreRefusedWithFileFieldGotAndWanted) {
                  {bad, "planner.rollouts", "got 'many'", "wanted"});
   expect_refused({easy, "--parameters", parameters("step_duration: .nan\n")},
                  {bad, "step_duration", "got '.nan'", "wanted"});
-  expect_refused({easy, "--parameters", parameters("planer: {rollouts: 8}\n")}, {bad, "planer", "wanted"});
+  expect_refused({easy, "--parameters", parameters("planer: {rollouts: 8}\n")},
+                 {bad, "planer", "did you mean planner"});
   expect_refused({easy, "--parameters", parameters("planner: [\n")}, {bad, "YAML"});
 }
 

@@ -247,7 +247,7 @@ TEST_P(BagCli, ExportRefusesTimesThatAreNoneAndFoldersThatHoldSomethingElse) {
   };
   expect_refused({"--from", "5", "--to", "4"}, 2, "--to: got 4 s, wanted at least the 5 s of --from");
   expect_refused({"--from", "11"}, 2, "--from: got 11 s, wanted at most 10 s, where the last message is");
-  expect_refused({"--to", "nan"}, 2, "--to: got nan s, wanted a number");
+  expect_refused({"--to", "nan"}, 2, "--to: got 'nan', wanted a finite number");
   EXPECT_EQ(run({"export", path, "--csv", "-o", path}), 1);
   EXPECT_THAT(program->err(), HasSubstr("wanted a new or an empty folder"));
   EXPECT_FALSE(fs::exists(path + "/robot_text.csv"));

@@ -91,7 +91,7 @@ TEST_F(Outputs, AreCheckedBeforeTheWorkAndAllNamed) {
   const std::string bad = "--json no/x.json --picture x.jpg --record " + fs::path(easy).parent_path().string();
   const Ended refused = shell("jostle_run " + easy + " --headless " + bad);
   EXPECT_EQ(refused.code, 2);
-  EXPECT_THAT(run.err,
+  EXPECT_THAT(refused.err,
               AllOf(HasSubstr("--json: got "), HasSubstr("folder no is not there"), HasSubstr("--picture: got "),
                     HasSubstr(".png"), HasSubstr("--record: got "), HasSubstr("in which there is something")));
   EXPECT_THAT(refused.err, Not(HasSubstr("iteration")));

@@ -266,7 +266,7 @@ TEST_F(Play, AStartOffsetBeginsWithItsMoment) {
   const auto scene = subscribe("/task/run", {.latched = true, .depth = 10});
   const auto status = subscribe("/robot/status");
   const auto notes = subscribe("/notes");
-  start({"--start", "1.75", "--duration", "0.5", "--rate", "10", "--wait-for-subscribers=1"});
+  start({"-v", "--start", "1.75", "--duration", "0.5", "--rate", "10", "--wait-for-subscribers=1"});
   EXPECT_EQ(player->wait(kPatience), 0) << player->err();
   EXPECT_TRUE(soon(kPatience, [&] { return notes->count() == 1 && status->count() == 2 && scene->count() == 2; }));
   EXPECT_THAT(scene->texts(), ElementsAre("scene0", "scene1"));

@@ -72,7 +72,7 @@ TEST_F(Profiles, ShippedOnesOfTopicsSayWhatTheCodeSays) {
     EXPECT_TRUE(writer_in_file == writer);
 
     DataReaderQos reader, reader_in_file;
-    wire::apply(kind, reader);
+    wire::apply_to_reader(kind, reader);
     ASSERT_EQ(participant.core().subscriber->get_datareader_qos_from_profile(name, reader_in_file),
               ReturnCode_t::RETCODE_OK);
     EXPECT_TRUE(reader_in_file == reader);

@@ -443,7 +443,7 @@ TEST_F(WorldLink, TheClockTellsTheTimeOfTheStampsAndTransformsDoNotRepeatThemsel
   const auto sim = program("jostle_sim", {easy});
   RobotClient robot{participant};
   const std::vector<double> u(4, 0.0);
-  ASSERT_TRUE(soon(kPatience, [&] { return robot.execute(u, 0.5).has_value(); })) << sim->err();
+  ASSERT_TRUE(soon(kPatience, [&] { return robot.execute(u, 0.5, std::stop_token{}).has_value(); })) << sim->err();
 
   double told = 0.0, stamped = 0.0;
   std::size_t states = 0, standing = 0;

@@ -29,7 +29,7 @@ std::string quoted(const std::string& text);
 Result<void> check_picture(const std::filesystem::path& picture);
 
 /// Draws a picture of so many pixels with a script that says nothing of terminal and output. A PDF is as large as the
-/// picture is on a screen of 96 pixels per inch. Makes the picture's folder.
+/// picture is on a screen of 96 pixels per inch.
 /// Errors   kInvalidArgument  see check_picture
 ///          kNotFound         gnuplot is not installed
 ///          kIo               the file cannot be written; gnuplot's own words

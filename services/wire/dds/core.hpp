@@ -121,8 +121,9 @@ std::optional<eprosima::fastdds::dds::DomainParticipantQos> built_in_participant
 /// the topic without the namespace, of the topic's kind.
 std::vector<std::string> profiles_for(const Participant::Core& core, const std::string& topic, const Qos& qos);
 
-/// Sets up a writer by its Qos, where the file of profiles says nothing; `apply` does so for readers.
+/// Sets up a writer, or a reader, by its Qos, where the file of profiles says nothing.
 void apply_to_writer(const Qos& qos, eprosima::fastdds::dds::DataWriterQos& writer);
+void apply_to_reader(const Qos& qos, eprosima::fastdds::dds::DataReaderQos& reader);
 
 /// Sets what writers and readers have alike.
 template <class EndpointQos>

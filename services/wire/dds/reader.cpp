@@ -10,14 +10,19 @@
 #include "services/wire/dds/profiles.hpp"
 
 namespace jostle::wire {
-namespace {
 
 using namespace eprosima::fastdds::dds;
 
+void apply_to_reader(const Qos& qos, DataReaderQos& reader) {
+  apply(qos, reader);
+  reader.resource_limits().max_instances = std::max(qos.instances, qos.instances_heard);
+}
+
+namespace {
+
 DataReaderQos reader_qos(const Participant::Core& core, const std::string& topic, const Qos& qos) {
   DataReaderQos result = core.subscriber->get_default_datareader_qos();
-  apply(qos, result);
-  result.resource_limits().max_instances = std::max(qos.instances, qos.instances_heard);
+  apply_to_reader(qos, result);
   // The file's word is in force instead, where it has one.
   for (const std::string& profile : profiles_for(core, topic, qos)) {
     if (core.subscriber->get_datareader_qos_from_profile(profile, result) == ReturnCode_t::RETCODE_OK) break;

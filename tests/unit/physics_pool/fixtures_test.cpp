@@ -145,7 +145,7 @@ INSTANTIATE_TEST_SUITE_P(
              "    pose: {position: [0.2, 0.3, 0.3], yaw: 0.5}\n",
              "",
              {"bad.yaml:7", "fixtures[0].pose", "missing"}},
-        Case{"FixtureNowhere", "[0.2, 0.3, 0.3]", "[0.2, .nan, 0.3]", {"bad.yaml:9", "pose.position[1]", "got nan"}},
+        Case{"FixtureNowhere", "[0.2, 0.3, 0.3]", "[0.2, .nan, 0.3]", {"bad.yaml:9", "pose.position[1]", "got '.nan'"}},
         Case{"FixtureStretched",
              "yaw: 0.5",
              "orientation: [1, 1, 0, 0]",

@@ -503,10 +503,10 @@ TEST_F(FindRobot, NamesFileLineAndFieldOfMistakes) {
   const std::string file = (base.path() / "dot.yaml").string();
   const auto told = [&](auto... words) { return testing::AllOf(HasSubstr(file), HasSubstr(words)...); };
   EXPECT_THAT(complaint("jostle_robot: 1", "jostle_robot: 2"), told(":1: jostle_robot", "got version 2", "wanted 1"));
-  EXPECT_THAT(complaint("radius", "radios"), told(":4: links[0].geoms[0].radius", "missing"));
+  EXPECT_THAT(complaint("radius", "radios"), told(":4: links[0].geoms[0].radios", "did you mean radius"));
   EXPECT_THAT(complaint("{x: 1}", "{y: 1}"), told(":5: axes[0].joints", "got 'y'", "one of: x"));
   EXPECT_THAT(complaint("slide", "screw"), told(":3: links[0].joints[0].kind", "got 'screw'", "hinge, slide"));
-  EXPECT_THAT(complaint("axes:", "axles:"), told("axes", "wanted a list"));
+  EXPECT_THAT(complaint("axes:", "axles:"), told(":5: axles", "did you mean axes"));
   EXPECT_THAT(complaint("gain: 1", "gain: 1000"), told("robot.joints[0] ('x').gain", "got 1000"));
 }
 

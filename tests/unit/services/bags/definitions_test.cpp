@@ -56,7 +56,7 @@ TEST(DefinitionOf, IsAMessageFileWithItsPartsBehindIt) {
                 "string frame_id\n" +
                 std::string(80, '=') +
                 "\nMSG: builtin_interfaces/Time\n"
-                "int32 sec  # since the Unix epoch\n"
+                "int32 sec  # of the clock that is meant: docs/topics.md\n"
                 "uint32 nanosec  # [0, 10^9)\n" +
                 std::string(80, '=') +
                 "\nMSG: geometry_msgs/Pose\n"

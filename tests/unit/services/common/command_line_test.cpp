@@ -148,9 +148,9 @@ TEST_F(CommandLine, ManualPageHasEveryOptionAndSubcommand) {
 TEST_F(CommandLine, ExitCodesAreDocumentedOnce) {
   document_exit_codes(bag);
   document_exit_codes(bag);
-  EXPECT_THAT(bag.get_footer(), StartsWith("Exit codes: 0 done, 1 the work failed, 2 wrong arguments"));
+  EXPECT_THAT(bag.get_footer(), StartsWith("Exit codes: 0 done, 1 the task failed, 2 bad input"));
   document_exit_codes(app);
-  EXPECT_THAT(app.get_footer(), Not(HasSubstr("wrong arguments")));
+  EXPECT_THAT(app.get_footer(), Not(HasSubstr("bad input")));
 }
 
 }  // namespace

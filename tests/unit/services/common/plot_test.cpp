@@ -50,6 +50,7 @@ class Path {
 
 TEST(Plot, DrawsWhatTheEndingSays) {
   const tests::TempFolder folder;
+  std::filesystem::create_directory(folder.path() / "new folder");
   for (const auto& [ending, beginning] : {std::pair{".png", "\x89PNG"}, std::pair{".PNG", "\x89PNG"},
                                           std::pair{".svg", "<?xml"}, std::pair{".pdf", "%PDF"}}) {
     const auto picture = folder.path() / "new folder" / (std::string("it's a plot") + ending);

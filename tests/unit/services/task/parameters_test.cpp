@@ -179,7 +179,7 @@ const std::vector<Case> kCases{
     {"NoHorizon", "mpc: {horizon: 0}\n", {"p.yaml", "mpc.horizon", "got 0", "1 to"}},
     {"NoActions", "mpc: {max_actions: 0}\n", {"p.yaml", "mpc.max_actions", "got 0", "1 to"}},
     {"UnknownMpcKey", "mpc: {steps: 3}\n", {"p.yaml:1", "mpc.steps", "unknown key", "horizon"}},
-    {"NaNTimeout", "control: {timeout: .nan}\n", {"p.yaml", "control.timeout", "nan", "1 to"}},
+    {"NaNTimeout", "control: {timeout: .nan}\n", {"p.yaml:1", "control.timeout", "nan", "finite"}},
     {"NegativeBudget", "control: {max_rollouts: -3}\n", {"p.yaml:1", "control.max_rollouts", "got -3", "0 to"}},
     {"NegativeSigma",
      "planner:\n  sigma: [1, 1, -1, 1]\n",

@@ -28,7 +28,7 @@ class Keystore : public ::testing::Test {
   static fs::perms mode(const fs::path& file) { return fs::status(file).permissions(); }
 
   tests::TempFolder folder;
-  fs::path keys = folder.path() / "below" / "keys";
+  fs::path keys = folder.path() / "keys";
 };
 
 TEST_F(Keystore, KeepsSecretsToItsOwner) {

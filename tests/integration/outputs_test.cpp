@@ -172,9 +172,7 @@ TEST_F(Outputs, CheckLooksAtEveryFileAndTellsEverything) {
 
 TEST_F(Outputs, TerminalThatIsDumbSeesNoEscapeCodes) {
   setenv("ROS_DOMAIN_ID", std::to_string(domain).c_str(), 1);
-  setenv("TERM", "dumb", 1);
-  TerminalProcess play("jostle_play", {kBag, "--rate", "100"});
-  setenv("TERM", "xterm", 1);
+  TerminalProcess play("jostle_play", {kBag, "--rate", "100"}, 120, "dumb");
   EXPECT_EQ(play.wait(kPatience), 0);
   EXPECT_THAT(play.screen(), AllOf(HasSubstr("jostle play: "), Not(HasSubstr("\033"))));
 }

@@ -272,7 +272,7 @@ TEST_F(Play, AStartOffsetBeginsWithItsMoment) {
   EXPECT_THAT(scene->texts(), ElementsAre("scene0", "scene1"));
   EXPECT_THAT(status->texts(), ElementsAre("state3", "state4"));
   EXPECT_THAT(notes->texts(), ElementsAre("note4"));
-  EXPECT_THAT(player->err(), HasSubstr("their last message is sent again: /robot/status, /task/run"));
+  EXPECT_THAT(player->err(), HasSubstr("the last message of these is sent again: /robot/status, /task/run"));
 }
 
 TEST_F(Play, LoopsUntilTold) {

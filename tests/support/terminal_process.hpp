@@ -17,6 +17,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tests/support/program_process.hpp"
@@ -26,7 +27,9 @@ namespace jostle::tests {
 /// Typed at through type(), seen through screen(). Killed at the end of its scope.
 class TerminalProcess {
  public:
-  TerminalProcess(const std::string& name, std::vector<std::string> arguments, unsigned short columns = 120)
+  /// `kind`: the terminal's, as TERM names it.
+  TerminalProcess(const std::string& name, std::vector<std::string> arguments, unsigned short columns = 120,
+                  const std::string& kind = "xterm")
       : master_(posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC)) {
     if (master_ < 0 || grantpt(master_) != 0 || unlockpt(master_) != 0) throw std::runtime_error("no pseudo-terminal");
     const std::string slave = ptsname(master_);
@@ -40,6 +43,12 @@ class TerminalProcess {
     std::vector<char*> words;
     for (std::string& argument : arguments) words.push_back(argument.data());
     words.push_back(nullptr);
+    std::string term = "TERM=" + kind;
+    std::vector<char*> variables{term.data()};
+    for (char** variable = environ; *variable; ++variable) {
+      if (!std::string_view(*variable).starts_with("TERM=")) variables.push_back(*variable);
+    }
+    variables.push_back(nullptr);
     posix_spawn_file_actions_t files;
     posix_spawn_file_actions_init(&files);
     posix_spawn_file_actions_addopen(&files, STDIN_FILENO, slave.c_str(), O_RDWR, 0);  // becomes its controlling one
@@ -48,7 +57,7 @@ class TerminalProcess {
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);
-    const int problem = posix_spawn(&pid_, program.c_str(), &files, &attributes, words.data(), environ);
+    const int problem = posix_spawn(&pid_, program.c_str(), &files, &attributes, words.data(), variables.data());
     posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&files);
     if (problem != 0) throw std::runtime_error("cannot start " + program.string());

@@ -31,7 +31,7 @@ int fail(const Error& error) {
     return common::kExitInterrupted;
   }
   fmt::print(stderr, "{}: {}\n", kSpeaker, error.message);
-  return error.code == Code::kInvalidArgument ? common::kExitUsage : common::kExitBroken;
+  return common::exit_code_of(error);
 }
 
 Result<int> exit_code(const Result<void>& ok) {
@@ -362,7 +362,7 @@ int list(const std::vector<std::unique_ptr<Benchmark>>& benchmarks) {
 }
 
 int run(Benchmark& benchmark, std::optional<int> domain) {
-  if (auto ok = benchmark.check(); !ok) return fail({Code::kInvalidArgument, ok.error().message});
+  if (auto ok = benchmark.check(); !ok) return fail(ok.error());
   // Neither a user's system nor another benchmark is in the way.
   std::optional<common::OwnDomain> own;
   if (!domain && benchmark.uses == Benchmark::Uses::kDomain) {

@@ -28,17 +28,7 @@ struct Arguments {
 
 int fail(const Error& error) {
   fmt::print(stderr, "{}: {}\n", kSpeaker, error.message);
-  switch (error.code) {
-    case Code::kCancelled:
-      return common::kExitInterrupted;
-    case Code::kNotFound:
-    case Code::kInvalidArgument:
-      return common::kExitUsage;
-    case Code::kUnavailable:
-      return common::kExitBroken;
-    default:
-      return common::kExitFailed;
-  }
+  return common::exit_code_of(error);
 }
 
 std::string with_duration(const StudyAbout& about) {

@@ -141,7 +141,7 @@ TEST_P(PbstoUpdate, PassesErrorsOfThePoolOn) {
 }
 
 TEST_P(PbstoUpdate, HandsDeadlineAndStopRequestOn) {
-  const TimePoint deadline = TimePoint{} + std::chrono::hours(5);
+  const TimePoint deadline = std::chrono::steady_clock::now() + std::chrono::hours(5);
   Pbsto sut(pool, options);
   ASSERT_TRUE(sut.plan(problem(2), deadline));
   EXPECT_THAT(pool.deadlines, testing::Each(deadline));

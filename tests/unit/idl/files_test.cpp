@@ -80,8 +80,9 @@ TEST_F(Files, LinkIntoItselfIsRefused) {
 }
 
 TEST_F(Files, DevicesAreWrittenToAndStay) {
-  const fs::path device = folder.path() / "null";
-  if (mknod(device.c_str(), S_IFCHR | 0600, 1 << 8 | 3) != 0) GTEST_SKIP() << "needs root";
+  fs::path device = folder.path() / "null";
+  // Only root makes devices; for everybody else the machine's own does as well, as they could not replace it.
+  if (mknod(device.c_str(), S_IFCHR | 0600, 1 << 8 | 3) != 0) device = "/dev/null";
   EXPECT_TRUE(check_outputs(std::vector<Output>{{"--json", device, {".json"}}}));
   EXPECT_TRUE(write(device, "gone"));
   EXPECT_TRUE(S_ISCHR(mode_of(device)));

@@ -2,29 +2,16 @@
 /// \file
 /// The word that was meant.
 
-#include <algorithm>
-#include <numeric>
+#include <cstddef>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace jostle {
 
-/// Returns how many letters have to be put in, left out or changed to make one word of another.
-inline std::size_t edits(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row.back();
-}
+/// Returns how many edits make one word of another: a letter put in, left out or changed, or two neighbours in the
+/// wrong order. The restricted distance of F. Damerau, A technique for computer detection and correction of spelling
+/// errors, 1964.
+std::size_t edits(std::string_view a, std::string_view b);
 
 /// Returns the known word that is nearest to `word`; empty if none is near enough to be meant. `known`: a range of
 /// texts.

@@ -126,6 +126,17 @@ class Strangers : public ::testing::Test {
 
 TEST_F(Strangers, WithoutIdentityAreKeptApart) { expect_apart({}, {}); }
 
+// Who looks for workers from the other side of the fence is told that there is one.
+TEST_F(Strangers, AreNamedAsTheCauseWhenNobodyIsHeard) {
+  ProgramProcess worker("jostle_worker", {}, folder);
+  ASSERT_TRUE(worker.says("rollouts at a time", kPatience)) << worker.err();
+
+  EXPECT_TRUE(soon(kPatience, [&] {
+    ProgramProcess tool("jostle_workers", {"--seconds", "1", "--secure", arm.string()}, folder);
+    return tool.wait(kPatience) == 1 && tool.err().find("unprotected and this program is protected") != tool.err().npos;
+  }));
+}
+
 TEST_F(Strangers, OfAnotherKeystoreAreKeptApart) {
   const Lab foreign(folder.path() / "foreign");
 

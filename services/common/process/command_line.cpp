@@ -10,8 +10,8 @@
 #include <regex>
 #include <sstream>
 
+#include "idl/text/nearest.hpp"
 #include "services/common/process/exit_codes.hpp"
-#include "services/common/process/nearest.hpp"
 #include "services/common/process/program.hpp"
 
 namespace jostle::common {
@@ -102,7 +102,7 @@ std::string first_line(const std::string& text) { return text.substr(0, text.fin
 // --- mistakes -----------------------------------------------------------------
 
 std::string hint(const Words& known, const std::string& word) {
-  const std::string meant = nearest(known, word);
+  const std::string meant = nearest(word, known);
   return meant.empty() ? "" : fmt::format("; did you mean {}?", meant);
 }
 
@@ -111,7 +111,7 @@ std::string meant_option(const CLI::App& app, const std::string& word) {
   for (const CLI::Option* option : options_of(app)) {
     known.insert(known.end(), option->get_lnames().begin(), option->get_lnames().end());
   }
-  const std::string meant = nearest(known, word.substr(word.find_first_not_of('-')));
+  const std::string meant = nearest(word.substr(word.find_first_not_of('-')), known);
   return meant.empty() ? "" : fmt::format("; did you mean --{}?", meant);
 }
 

@@ -231,7 +231,7 @@ Error RemotePool::no_worker() const {
   const double seconds = std::chrono::duration<double>(options_.no_worker_timeout).count();
   std::string message = fmt::format("no {} for {:g} s on domain {}; start one with `jostle worker`",
                                     ever_heard_ ? "usable worker" : "worker heard", seconds, participant_.domain());
-  return {Code::kUnavailable, message + last_trouble()};
+  return {Code::kUnavailable, message + participant_.possible_cause() + last_trouble()};
 }
 
 std::string RemotePool::last_trouble() const {

@@ -411,11 +411,11 @@ msg::WorkerHeartbeat WorkerService::heartbeat(const std::vector<std::uint64_t>& 
   message.refused(refused_);
   message.busy(static_cast<std::uint32_t>(dealt_));
   for (const std::uint64_t client : clients) {
-    msg::ClientLoad load;
-    load.client(client);
+    msg::ClientLoad served;
+    served.client(client);
     const auto found = accounts_.find(client);
-    load.samples(found == accounts_.end() ? 0 : found->second.samples);
-    message.clients().push_back(load);
+    served.samples(found == accounts_.end() ? 0 : found->second.samples);
+    message.clients().push_back(served);
   }
   return message;
 }

@@ -56,8 +56,8 @@ int list_workers(const wire::Participant& participant, const Arguments& argument
       if (arguments.json) print(lines, arguments);
       fmt::print(stderr,
                  "jostle workers: no worker was heard for {:g} s on domain {}; start one with `jostle worker`, or see "
-                 "`jostle doctor`\n",
-                 arguments.seconds, participant.domain());
+                 "`jostle doctor`{}\n",
+                 arguments.seconds, participant.domain(), participant.possible_cause());
       return common::kExitFailed;
     }
     print(lines, arguments);

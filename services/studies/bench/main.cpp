@@ -51,8 +51,8 @@ class Benchmark {
  public:
   enum class Uses { kNothing, kDomain };
 
-  Benchmark(std::string name, std::string purpose, std::string takes, Uses uses)
-      : name(std::move(name)), purpose(std::move(purpose)), takes(std::move(takes)), uses(uses) {}
+  Benchmark(std::string its_name, std::string its_purpose, std::string it_takes, Uses what)
+      : name(std::move(its_name)), purpose(std::move(its_purpose)), takes(std::move(it_takes)), uses(what) {}
   virtual ~Benchmark() = default;
 
   virtual void add_options(CLI::App& app) = 0;
@@ -87,8 +87,8 @@ class Ratio : public Benchmark {
  public:
   using Measure = Result<void> (*)(const Settings&);
 
-  Ratio(std::string name, std::string purpose, std::string takes, Uses uses, int repeats, Measure measure)
-      : Benchmark(std::move(name), std::move(purpose), std::move(takes), uses), measure_(measure) {
+  Ratio(std::string its_name, std::string its_purpose, std::string it_takes, Uses what, int repeats, Measure measure)
+      : Benchmark(std::move(its_name), std::move(its_purpose), std::move(it_takes), what), measure_(measure) {
     settings_.repeats = repeats;
   }
 

@@ -25,7 +25,9 @@ int fail(const Error& error, int code) {
 }
 
 // Waits until one coordinator and a world are there, and gives the coordinator the goal.
-Result<void> send(GoalClient& client, const RunOptions& options, int domain, double patience, std::stop_token stop) {
+Result<void> send(GoalClient& client, const RunOptions& options, const wire::Participant& participant, double patience,
+                  std::stop_token stop) {
+  const int domain = participant.domain();
   const auto deadline =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(patience));
   for (;;) {
@@ -42,8 +44,9 @@ Result<void> send(GoalClient& client, const RunOptions& options, int domain, dou
     }
     return Error{
         Code::kUnavailable,
-        fmt::format("domain {}: no {} heard for {:g} s; start one with `jostle {}`, or see `jostle doctor`", domain,
-                    answers ? "world was" : "coordinator was", patience, answers ? "sim SCENE" : "coordinator")};
+        fmt::format("domain {}: no {} heard for {:g} s; start one with `jostle {}`, or see `jostle doctor`{}", domain,
+                    answers ? "world was" : "coordinator was", patience, answers ? "sim SCENE" : "coordinator",
+                    participant.possible_cause())};
   }
 }
 
@@ -82,7 +85,7 @@ int perform(const RunOptions& options, double patience, std::stop_token stop) {
   const auto code_of = [](const Error& error) {
     return error.code == Code::kCancelled ? common::kExitInterrupted : common::kExitBroken;
   };
-  if (auto ok = send(client, options, participant_result->domain(), patience, stop); !ok) {
+  if (auto ok = send(client, options, *participant_result, patience, stop); !ok) {
     return fail(ok.error(), code_of(ok.error()));
   }
   auto result = follow(client, line, std::move(stop));

@@ -220,9 +220,9 @@ Result<void> Session::send_goal() {
     if (Clock::now() < goal_deadline_) return {};
     return Error{Code::kUnavailable,
                  fmt::format("{} not heard within {} s of its start on domain {}; `jostle doctor` checks "
-                             "shared memory and multicast",
+                             "shared memory and multicast{}",
                              answers ? "the simulated world was" : "the coordinator was", kStart.count(),
-                             participant_.domain())};
+                             participant_.domain(), participant_.possible_cause())};
   }
   if (client_.send(make_goal(options_), found.front()) || Clock::now() < goal_deadline_)
     return {};  // else the next tick

@@ -14,8 +14,8 @@
 #include <string_view>
 #include <thread>
 
+#include "idl/text/nearest.hpp"
 #include "services/common/process/environment.hpp"
-#include "services/common/process/nearest.hpp"
 #include "services/tools/doctor/peer.hpp"
 #include "services/wire/dds/discovery.hpp"
 #include "services/wire/security/identity.hpp"
@@ -197,7 +197,7 @@ std::vector<Check> check_misspelt() {
     if (!name.starts_with(kOurs)) continue;
     const std::string rest = name.substr(kOurs.size());
     if (std::ranges::count(known, rest) > 0) continue;
-    const std::string meant = common::nearest(known, rest);
+    const std::string meant = nearest(rest, known);
     checks.push_back({name, Verdict::kWarn, "no program reads it",
                       meant.empty() ? kUnset : fmt::format("did you mean {}{}?", kOurs, meant)});
   }

@@ -264,11 +264,10 @@ std::vector<Check> check_dds(const Pair& pair, const wire::Participant& particip
   if (!met) {
     const auto others = participant.others();
     const bool found = std::ranges::count(others, "jostle_doctor") > 1;  // we are one
-    const std::string apart = participant.who_is_apart();
     return {{"participants", Verdict::kFail,
-             fmt::format("{} in {} s{}{}",
+             fmt::format("{} in {} s{}",
                          found ? "found each other, their topics did not match" : "did not find each other",
-                         kMeeting.count(), apart.empty() ? "" : "; ", apart),
+                         kMeeting.count(), participant.possible_cause()),
              remedy_for_strangers(pair, found)}};
   }
   caller.settle(Clock::now() + kSettling);  // whether answers come at all is for the samples to say

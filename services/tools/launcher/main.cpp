@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "idl/text/nearest.hpp"
 #include "services/common/process/files.hpp"
-#include "services/common/process/nearest.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/process/standard_streams.hpp"
 #include "services/tools/launcher/programs.hpp"
@@ -32,7 +32,7 @@ int show_help(const std::filesystem::path& folder) {
 }
 
 int complain(const std::filesystem::path& folder, const std::string& name) {
-  const std::string meant = common::nearest(names_of(installed_programs(folder)), name);
+  const std::string meant = nearest(name, names_of(installed_programs(folder)));
   fmt::print(stderr, "jostle: no program '{}' in {}; {}\n", name, folder.string(),
              meant.empty() ? "`jostle help` lists what there is" : fmt::format("did you mean `jostle {}`?", meant));
   return common::kExitUsage;

@@ -333,6 +333,11 @@ std::vector<std::string> profiles_for(const Participant::Core& core, const std::
 
 std::string Participant::who_is_apart() const { return core_->who_is_apart(); }
 
+std::string Participant::possible_cause() const {
+  const std::string apart = who_is_apart();
+  return apart.empty() ? "" : "; " + apart;
+}
+
 std::string Participant::Core::who_is_apart() const {
   const int count = listener_->apart();
   if (count == 0) return "";

@@ -107,6 +107,9 @@ class Participant {
   /// the other way round; "" if there are none. A part of a sentence, for messages about somebody who is missing.
   std::string who_is_apart() const;
 
+  /// Returns who_is_apart() as an appendix to the message that somebody was not heard: "; ..." or "".
+  std::string possible_cause() const;
+
   class Core;
   Core& core() const { return *core_; }
 

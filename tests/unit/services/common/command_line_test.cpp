@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 
 #include "services/common/process/cores.hpp"
-#include "services/common/process/nearest.hpp"
 
 namespace jostle::common {
 namespace {
@@ -16,14 +15,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 using testing::StartsWith;
-
-TEST(Nearest, IsTheWordThatTakesTheFewestEdits) {
-  const std::vector<std::string> words{"record", "replay", "run"};
-  EXPECT_EQ(nearest(words, "reply"), "replay");
-  EXPECT_EQ(nearest(words, "recrod"), "record");
-  EXPECT_EQ(nearest(words, "xyz"), "");
-  EXPECT_EQ(nearest({}, "run"), "");
-}
 
 // A program like ours: options of its own, and another one with subcommands.
 class CommandLine : public testing::Test {

@@ -1,13 +1,10 @@
-#include "services/common/process/nearest.hpp"
+#include "idl/text/nearest.hpp"
 
 #include <algorithm>
-#include <cstddef>
-#include <string_view>
+#include <vector>
 
-namespace jostle::common {
-namespace {
+namespace jostle {
 
-// Damerau's distance: letters left out, too many, wrong, or two in the wrong order.
 std::size_t edits(std::string_view a, std::string_view b) {
   std::vector<std::vector<std::size_t>> least(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) {
@@ -25,19 +22,4 @@ std::size_t edits(std::string_view a, std::string_view b) {
   return least[a.size()][b.size()];
 }
 
-}  // namespace
-
-std::string nearest(const std::vector<std::string>& words, const std::string& word) {
-  // Every second letter wrong is no misspelling any more.
-  std::size_t fewest = word.size() / 2 + 1;
-  std::string found;
-  for (const std::string& candidate : words) {
-    const std::size_t needed = edits(word, candidate);
-    if (needed >= fewest) continue;
-    fewest = needed;
-    found = candidate;
-  }
-  return found;
-}
-
-}  // namespace jostle::common
+}  // namespace jostle

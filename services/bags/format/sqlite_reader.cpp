@@ -15,6 +15,8 @@
 namespace jostle::bags {
 namespace {
 
+constexpr std::int64_t kFarthest = std::int64_t{1} << 40;  // messages, that are looked for behind damaged pages
+
 constexpr int kNewestVersion = 4;
 
 class SqliteReader final : public FileReader {
@@ -249,20 +251,23 @@ class SqliteReader final : public FileReader {
   Result<void> count_one_by_one() {
     (void)count_repeated();  // they are left out in any case
     std::int64_t last = repeated_;
+    std::int64_t leap = 1;  // over what is found and cannot be read, longer each time: a tree may lead in circles
     for (;;) {
       const std::int64_t before = last;
       const auto end = count_from(last);
+      last = std::max(last, before);  // nor need its numbers ascend
       if (options_.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
       if (last > before) stretches_.emplace_back(before, last);
       if (end) return {};
       const auto next = next_readable(last);
       const std::string where = fmt::format("{}, behind message {}", end.error().message, last);
-      if (!next) {
+      if (!next || leap > kFarthest) {
         info_.findings.lost(Part::kRecord, where + ": the rest of the table", "");
         return {};
       }
       // One that is found and cannot be read after all is passed over, too.
-      const std::int64_t passed = last == before ? std::max(*next, last + 1) : *next - 1;
+      const std::int64_t passed = last == before ? std::max(*next, last + leap) : *next - 1;
+      leap = last == before ? 2 * leap : 1;
       if (passed > last) {
         info_.findings.lost(Part::kMessage, "damaged pages", where, static_cast<std::uint64_t>(passed - last));
       }
@@ -300,7 +305,6 @@ class SqliteReader final : public FileReader {
       if (!is_there) return is_there.error();
       return *is_there ? std::optional(row_result->number(1)) : std::nullopt;
     };
-    constexpr std::int64_t kFarthest = std::int64_t{1} << 40;
     std::int64_t unreadable = last, stride = 1;
     if (last > std::numeric_limits<std::int64_t>::max() - 2 * kFarthest) return {};
     while (!look(unreadable + stride)) {

@@ -49,9 +49,11 @@ Result<void> parse(const std::filesystem::path& file, const std::string& text, c
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     return Error{Code::kInvalidArgument, fmt::format("{}: got no XML ({})", file.string(), document.ErrorStr())};
   }
-  if (std::string_view(document.RootElement()->Name()) == root) return {};
-  return malformed(file, document.RootElement(),
-                   fmt::format("got <{}>, wanted <{}>", document.RootElement()->Name(), root));
+  // The parser takes a text without any element, or with an end of none, for XML.
+  const XMLElement* got = document.RootElement();
+  if (!got) return malformed(file, nullptr, fmt::format("got no element, wanted <{}>", root));
+  if (std::string_view(got->Name()) == root) return {};
+  return malformed(file, got, fmt::format("got <{}>, wanted <{}>", got->Name(), root));
 }
 
 // Fast DDS reads these dates in the local time of the machine, whatever zone

@@ -321,7 +321,9 @@ std::string change_files(Files& bag, Dice& dice) {
       bag[one].second += bag[other].second;
       return "a file behind another";
     default:
-      bag.emplace_back("more" + fs::path(bag[one].first).extension().string(), bag[one].second);
+      // A name of its own, also where there is one more already.
+      bag.emplace_back("more" + std::to_string(bag.size()) + fs::path(bag[one].first).extension().string(),
+                       bag[one].second);
       return "a file more";
   }
 }

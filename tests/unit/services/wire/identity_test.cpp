@@ -247,6 +247,17 @@ TEST_F(IdentityFolder, WithTextsChangedAfterSigningIsRefused) {
                  {"permissions.p7s: got a text that its signature does not fit", "as '" + lab_name + "' signed it"});
 }
 
+TEST_F(IdentityFolder, WithSignedTextsThatHaveNoElementIsRefused) {
+  for (const char* name : {"governance.p7s", "permissions.p7s"}) {
+    for (const char* text : {"<!-- nothing -->\n", "<?xml version=\"1.0\"?>\n</max><dds></dds>\n"}) {
+      const std::string before = tests::contents(arm / name);
+      tests::overwrite(arm / name, lab.signed_by_authority(text));
+      expect_refused(arm, {name});
+      tests::overwrite(arm / name, before);
+    }
+  }
+}
+
 // Fast DDS takes permissions that any certificate below the CA signed, if it is
 // good for S/MIME. Ours are not: neither we nor Fast DDS's own call may accept it.
 TEST_F(IdentityFolder, WithPermissionsItSignedItselfIsRefused) {

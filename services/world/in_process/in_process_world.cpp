@@ -23,14 +23,16 @@ std::vector<perception::ObjectReading> object_readings(const StateLayout& layout
   return readings;
 }
 
-Result<robot_bridge::RobotReading> SimulatedRobot::read() {
-  const State& x = world_.state();
-  const physics_pool::TaskGeometry& geometry = world_.world().geometry();
+robot_bridge::RobotReading robot_reading(const physics_pool::ExecutionWorld& world) {
+  const State& x = world.state();
+  const physics_pool::TaskGeometry& geometry = world.world().geometry();
   const int joints = geometry.layout.robot_joints();
-  return robot_bridge::RobotReading{.q = {x.q.begin(), x.q.begin() + joints},
-                                    .v = {x.v.begin(), x.v.begin() + joints},
-                                    .object_in_hand = physics_pool::object_in_hand(geometry, x)};
+  return {.q = {x.q.begin(), x.q.begin() + joints},
+          .v = {x.v.begin(), x.v.begin() + joints},
+          .object_in_hand = physics_pool::object_in_hand(geometry, x)};
 }
+
+Result<robot_bridge::RobotReading> SimulatedRobot::read() { return robot_reading(world_); }
 
 Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {
   if (auto ok = robot_bridge::check_command(u, physics_pool::axis_limits(world_.world().scene().robot.model), duration);

@@ -14,6 +14,9 @@ namespace jostle::world {
 /// Makes object readings from a full state.
 std::vector<perception::ObjectReading> object_readings(const StateLayout& layout, const State& x);
 
+/// Returns what the robot of an execution world says of itself.
+robot_bridge::RobotReading robot_reading(const physics_pool::ExecutionWorld& world);
+
 /// Moves an execution world by commands. Time stands still between actions, as
 /// in the thesis's simulation experiments.
 class SimulatedRobot final : public robot_bridge::Robot {

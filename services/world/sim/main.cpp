@@ -73,9 +73,10 @@ int main(int argc, char** argv) {
 
   try {
     SimulatedWorld world(*participant_result, *world_result, options);
+    RobotServer server(*participant_result, world);
     spdlog::info("world '{}' of {} objects on domain {}, uncertainty {}", scene_result->name,
                  scene_result->objects.size(), participant_result->domain(), level);
-    if (auto ok = world.run(signal.token()); !ok) return fail(ok.error());
+    if (auto ok = server.run(signal.token()); !ok) return fail(ok.error());
     return common::kExitOk;
   } catch (const wire::SetupError& error) {
     return fail({Code::kUnavailable, error.what()});

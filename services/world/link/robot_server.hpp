@@ -1,0 +1,119 @@
+#pragma once
+/// \file
+/// A robot that obeys over DDS: the server's half of the link.
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "idl/types/result.hpp"
+#include "robot_bridge/api/robot.hpp"
+#include "services/common/process/trouble.hpp"
+#include "services/wire/dds/participant.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
+
+namespace jostle::world {
+
+/// A Body is what a RobotServer moves: a simulated world, or an arm. One thread.
+///
+/// Errors   kInternal: it cannot go on, and the server ends; all others end the motion at work, and are told to its
+///          commander.
+class Body {
+ public:
+  virtual ~Body() = default;
+
+  /// Returns the largest speeds of the axes, m/s or rad/s.
+  virtual std::vector<double> limits() const = 0;
+
+  /// Starts to apply u (m/s, rad/s) for `duration` s.
+  virtual Result<void> begin(std::span<const double> u, double duration) = 0;
+  /// Whether the motion's time is over.
+  virtual bool is_over() const = 0;
+  /// Lets a little time go by, some milliseconds at most.
+  virtual Result<void> advance() = 0;
+  /// Ends the motion here and now; the robot stands still.
+  virtual void halt() = 0;
+
+  /// No motion is at work: lets a little time go by, or returns false where it stands still, or needs nobody to go by.
+  virtual Result<bool> rest() = 0;
+
+  /// Returns s of the clock that stamps are of.
+  virtual double time() const = 0;
+  virtual robot_bridge::RobotReading reading() const = 0;
+  /// Publishes what it knows beyond that.
+  virtual void publish() = 0;
+};
+
+/// Executes velocity commands one after the other, and publishes statuses.
+///
+/// It obeys one commander at a time: a participant, and an epoch of its choice that means one
+/// task. Nobody else is obeyed as long as the middleware hears the commander; then the first
+/// good command is, and a newcomer that comes sooner waits for some seconds. A commander's new
+/// epoch ends its old one for good. Commands carry a sequence number; one that is done already is
+/// counted and dropped, a bad one of the commander is refused in `RobotStatus.error`.
+/// A stop (messages.hpp) ends the command at work at once; everything else waits
+/// for its turn. The robot stands still when no command is at work.
+class RobotServer {
+ public:
+  RobotServer(const wire::Participant& participant, Body& body);
+
+  /// Runs until a stop is requested. Error kInternal of the body; it is also published.
+  Result<void> run(std::stop_token stop);
+
+ private:
+  struct Action {
+    std::uint64_t epoch = 0, sequence_number = 0;
+    std::vector<double> u;
+    double duration = 0.0;  // s
+  };
+
+  using Letter = wire::Inbox<jostle_msgs::msg::VelocityCommand>::Letter;
+  /// Somebody who would command, and waits until nobody does.
+  struct Newcomer {
+    Letter letter;
+    std::chrono::steady_clock::time_point since;
+  };
+
+  void receive();
+  bool told_to_stop();
+  bool may_command(const Letter& letter) const;
+  void make_wait(Letter letter);
+  void accept(Letter letter);
+  void obey(const jostle_msgs::msg::VelocityCommand& command);
+  bool begin(const jostle_msgs::msg::VelocityCommand& command, std::uint64_t writer);
+  void say_troubles();
+  Result<void> act(const Action& action, std::stop_token stop);
+  Result<void> move(const Action& action, std::stop_token stop);
+  Result<void> rest(std::stop_token stop);
+  void publish();
+  void publish_when_due();
+
+  Body& body_;
+  const std::vector<double> limits_;  // largest speeds of the axes, m/s or rad/s
+  std::deque<Letter> waiting_;        // the commander's, came while an action was at work
+  std::deque<Newcomer> newcomers_;    // the newest command of each
+  std::deque<Action> actions_;
+  std::optional<std::uint64_t> commander_;  // its participant
+  std::uint64_t epoch_ = 0;                 // of the commander
+  std::deque<std::uint64_t> past_epochs_;   // that have ended
+  std::uint64_t finished_ = 0;              // the commander's last finished, stopped or refused command
+  std::uint64_t accepted_ = 0;              // its last accepted command
+  common::Trouble stale_{"stale commands"};
+  common::Trouble refused_{"refused commands"};
+  common::Trouble foreign_{"commands of others"};
+  bool busy_ = false;
+  std::string error_;
+  std::chrono::steady_clock::time_point next_publication_;
+
+  wire::Writer<jostle_msgs::msg::RobotStatus> status_;
+  wire::Inbox<jostle_msgs::msg::VelocityCommand> commands_;
+};
+
+}  // namespace jostle::world

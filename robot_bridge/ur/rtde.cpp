@@ -222,6 +222,11 @@ std::optional<FieldType> parse_field_type(std::string_view name) {
   return static_cast<FieldType>(found - kTypes.begin());
 }
 
+Value zero_of(FieldType type) {
+  BigEndianReader nothing({});  // reads as 0
+  return read_value(type, nothing);
+}
+
 std::optional<FieldType> output_field(std::string_view name) {
   if (const auto type = find_field(kOutputFields, "output_", name)) return type;
   return name.starts_with("input_") ? input_field(name) : std::nullopt;  // inputs can be read back

@@ -77,6 +77,8 @@ const char* name_of(FieldType type);
 /// Returns the number of bytes on the wire.
 std::size_t size_of(FieldType type);
 std::optional<FieldType> parse_field_type(std::string_view name);
+/// Returns a value of that type, all of it 0.
+Value zero_of(FieldType type);
 
 /// Returns the type of a field that controllers give out, or take, by its name: "actual_q",
 /// "input_double_register_24". Nothing if there is no such field.

@@ -42,11 +42,10 @@ Result<void> send(GoalClient& client, const RunOptions& options, const wire::Par
                    fmt::format("domain {}: got {} coordinators, wanted one; --namespace tells robots apart", domain,
                                found.size())};
     }
-    return Error{
-        Code::kUnavailable,
-        fmt::format("domain {}: no {} heard for {:g} s; start one with `jostle {}`, or see `jostle doctor`{}", domain,
-                    answers ? "world was" : "coordinator was", patience, answers ? "sim SCENE" : "coordinator",
-                    participant.possible_cause())};
+    return Error{Code::kUnavailable,
+                 fmt::format("domain {}: no {} heard for {:g} s; start one with `jostle {}`, or see `jostle doctor`{}",
+                             domain, answers ? "world was" : "coordinator was", patience,
+                             answers ? "sim SCENE" : "coordinator", participant.possible_cause())};
   }
 }
 

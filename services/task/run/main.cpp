@@ -52,6 +52,7 @@ int main(int argc, char** argv) {
   RunOptions options;
   options.workers = common::usable_cores();
   bool pin = false;
+  std::string arm = "sim";
   add_goal_options(app, arguments, options);
   common::add_count_option(app, "--workers", options.workers, 0,
                            "Worker processes, or threads; auto: one per core this process may use")
@@ -64,12 +65,23 @@ int main(int argc, char** argv) {
   app.add_option("--rate", options.rate, "World seconds per second while acting; 0: as fast as possible")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
+  app.add_option("--arm", arm,
+                 "What moves: sim, the planner's own robot; ur-sim, a UR5 behind a simulated controller;\n"
+                 "ur:HOST, a UR5 (read docs/robots.md first)")
+      ->capture_default_str();
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   if (options.pool == "threads" && options.workers == 0) {
     return fail({Code::kInvalidArgument, "--workers: got 0, wanted at least 1 thread"}, common::kExitUsage);
   }
   if (pin && options.pool == "threads") {
     return fail({Code::kInvalidArgument, "--pin: got --pool threads, wanted dds: only worker processes are pinned"},
+                common::kExitUsage);
+  }
+  auto arm_result = parse_arm(arm);
+  if (!arm_result) return fail(arm_result.error(), common::kExitUsage);
+  options.arm = std::move(arm_result).value();
+  if (options.arm.kind != Arm::Kind::kSim && arguments.level != "none") {
+    return fail({Code::kInvalidArgument, "--uncertainty: got --arm " + arm + ", wanted sim: only it is disturbed"},
                 common::kExitUsage);
   }
   if (pin) options.cores = common::allowed_cores();

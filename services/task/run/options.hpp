@@ -12,6 +12,7 @@
 #include "physics_pool/scene/scene.hpp"
 #include "physics_pool/uncertainty/levels.hpp"
 #include "services/task/config/parameter_keys.hpp"
+#include "services/task/run/arm.hpp"
 
 namespace CLI {
 class App;
@@ -32,6 +33,7 @@ struct RunOptions {
   std::vector<int> cores;  ///< dealt to the workers in turn; empty: not pinned
   std::uint64_t seed = 1;
   double rate = 0.0;  ///< of the simulated world; 0: as fast as possible
+  Arm arm;            ///< what moves
   bool plan_only = false;
   bool headless = false;  ///< plain lines instead of a live display
   std::optional<int> domain;

@@ -105,8 +105,10 @@ Result<void> draw(const RunOptions& options, const json& report) {
     fmt::print(summary_of(options), "  picture      not drawn: there is no plan\n");
     return {};
   }
-  const json input{{"scene", physics_pool::to_yaml(options.plan_only ? options.planning : options.scene)},
-                   {"frames", frames_of(states, options, report)}};
+  const auto drawn_result = drawn(options.arm, options.plan_only ? options.planning : options.scene, states);
+  if (!drawn_result) return drawn_result.error();
+  const json input{{"scene", physics_pool::to_yaml(drawn_result->scene)},
+                   {"frames", frames_of(drawn_result->states, options, report)}};
   const auto folder_result = common::make_temporary_folder("picture");
   if (!folder_result) return folder_result.error();
   auto drawn = draw_in(*folder_result, options.picture, input.dump());

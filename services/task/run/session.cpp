@@ -58,11 +58,11 @@ Session::Session(const RunOptions& options, Watcher watcher, wire::Participant p
 Session::~Session() {
   // All at once, then one after the other: shutting down takes as long as the slowest.
   for (common::ChildProcess& worker : workers_) worker.terminate();
-  if (world_process_) world_process_->terminate();
+  for (WorldProcess& one : world_) one.process.terminate();
   if (coordinator_process_) coordinator_process_->terminate();
   if (recorder_process_) recorder_process_->terminate();
   workers_.clear();
-  world_process_.reset();
+  world_.clear();
   coordinator_process_.reset();
   (void)finish_recording();  // a run that failed has said worse
   std::error_code ignored;
@@ -144,14 +144,13 @@ Result<void> Session::start_processes() {
   const auto belief_file = folder_ / "belief.yaml";
   if (auto ok = common::write_text(belief_file, physics_pool::to_yaml(options_.planning)); !ok) return ok;
 
-  auto world_result = common::ChildProcess::start(
-      program("sim"),
-      {scene_file.string(), "--belief", belief_file.string(), "--uncertainty", physics_pool::to_string(options_.level),
-       "--seed", std::to_string(options_.seed), "--rate", fmt::format("{}", options_.rate), "--domain", domain,
-       "--die-with-parent", std::to_string(getpid())},
-      folder_ / "sim.log");
-  if (!world_result) return world_result.error();
-  world_process_ = std::move(world_result).value();
+  for (Part& part : parts_of_world(options_, scene_file, belief_file, participant_.domain())) {
+    auto process_result =
+        common::ChildProcess::start(program(part.program.c_str()), part.arguments, folder_ / (part.program + ".log"));
+    if (!process_result) return process_result.error();
+    world_.push_back({std::move(part.title), std::move(process_result).value()});
+  }
+  robot_.name = world_.back().title;
 
   std::vector<std::string> arguments{"--pool", options_.pool,       "--domain",
                                      domain,   "--die-with-parent", std::to_string(getpid())};
@@ -167,7 +166,8 @@ Result<void> Session::start_processes() {
     if (!worker_result) return worker_result.error();
     workers_.push_back(std::move(worker_result).value());
   }
-  goal_deadline_ = Clock::now() + kStart;
+  goal_patience_ = patience(options_.arm);
+  goal_deadline_ = Clock::now() + goal_patience_;
   return {};
 }
 
@@ -221,7 +221,7 @@ Result<void> Session::send_goal() {
     return Error{Code::kUnavailable,
                  fmt::format("{} not heard within {} s of its start on domain {}; `jostle doctor` checks "
                              "shared memory and multicast{}",
-                             answers ? "the simulated world was" : "the coordinator was", kStart.count(),
+                             answers ? world_.back().title + " was" : "the coordinator was", goal_patience_.count(),
                              participant_.domain(), participant_.possible_cause())};
   }
   if (client_.send(make_goal(options_), found.front()) || Clock::now() < goal_deadline_)
@@ -229,14 +229,16 @@ Result<void> Session::send_goal() {
   return Error{Code::kUnavailable,
                fmt::format("the goal could not be sent within {} s: the middleware did not take it; profiles that "
                            "limit {} may be the reason",
-                           kStart.count(), wire::topics::kTaskGoal.name)};
+                           goal_patience_.count(), wire::topics::kTaskGoal.name)};
 }
 
 Result<void> Session::look_after() {
   look_after_recorder();
-  if (auto ok = check_alive("the simulated world", *world_process_); !ok) return ok;
+  for (WorldProcess& one : world_) {
+    if (auto ok = check_alive(one.title, one.process); !ok) return ok;
+  }
   if (auto ok = check_alive("the coordinator", *coordinator_process_); !ok) return ok;
-  look_for(world_part_, client_.world_heard());
+  look_for(robot_, client_.world_heard());
   look_for(coordinator_, client_.coordinator_heard());
   if (const auto heard = client_.coordinator_heard(); heard && Clock::now() - *heard >= kLongSilence) {
     return Error{
@@ -272,15 +274,15 @@ Result<void> Session::check_alive(const std::string& name, common::ChildProcess&
   return Error{Code::kUnavailable, fmt::format("{} ended: {}\n{}", name, ended->text(), child.last_words())};
 }
 
-void Session::look_for(Part& part, std::optional<Clock::time_point> heard) {
+void Session::look_for(Voice& voice, std::optional<Clock::time_point> heard) {
   if (!heard) return;
   const std::chrono::duration<double> silence = Clock::now() - *heard;
   const bool missed = silence >= kSilence;
-  if (missed == std::exchange(part.missed, missed)) return;
+  if (missed == std::exchange(voice.missed, missed)) return;
   notice(missed ? fmt::format(
                       "{} runs but was not heard for {:.1f} s; the machine may be busy, or it is stalled or cut off",
-                      part.name, silence.count())
-                : fmt::format("{} is heard again", part.name));
+                      voice.name, silence.count())
+                : fmt::format("{} is heard again", voice.name));
 }
 
 Witness::Witness(const wire::Participant& participant, bool listens) {

@@ -87,14 +87,14 @@ class Session {
   void look_after_recorder();
   Result<void> check_recording() const;
   Result<void> check_alive(const std::string& name, common::ChildProcess& child) const;
-  // Another part of the run, and whether it is missed.
-  struct Part {
+  // Somebody who is heard, and whether he is missed.
+  struct Voice {
     std::string name;
     bool missed = false;  // and said so
   };
 
-  // Says when a part, heard last at `heard`, falls silent, and when it is heard again.
-  void look_for(Part& part, std::optional<Clock::time_point> heard);
+  // Says when a voice, heard last at `heard`, falls silent, and when it is heard again.
+  void look_for(Voice& voice, std::optional<Clock::time_point> heard);
   void notice(const std::string& text) const;
   Result<void> send_goal();
 
@@ -105,14 +105,20 @@ class Session {
   std::filesystem::path folder_;  // for logs and the scene; removed at the end
   int workers_started_ = 0;
   Clock::time_point goal_deadline_;
-  Part coordinator_{"the coordinator"}, world_part_{"the simulated world"};
+  std::chrono::seconds goal_patience_{};
+  Voice coordinator_{"the coordinator"}, robot_{"the robot"};
   GoalClient client_;
   Witness witness_;
 
   std::vector<common::ChildProcess> workers_;
   std::vector<Clock::time_point> restarts_;
   bool recorder_missed_ = false;  // it ended, and that was said
-  std::optional<common::ChildProcess> world_process_, coordinator_process_, recorder_process_;
+  struct WorldProcess {
+    std::string title;
+    common::ChildProcess process;
+  };
+  std::vector<WorldProcess> world_;
+  std::optional<common::ChildProcess> coordinator_process_, recorder_process_;
 };
 
 }  // namespace jostle::task

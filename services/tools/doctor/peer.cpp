@@ -264,11 +264,11 @@ std::vector<Check> check_dds(const Pair& pair, const wire::Participant& particip
   if (!met) {
     const auto others = participant.others();
     const bool found = std::ranges::count(others, "jostle_doctor") > 1;  // we are one
-    return {{"participants", Verdict::kFail,
-             fmt::format("{} in {} s{}",
-                         found ? "found each other, their topics did not match" : "did not find each other",
-                         kMeeting.count(), participant.possible_cause()),
-             remedy_for_strangers(pair, found)}};
+    return {
+        {"participants", Verdict::kFail,
+         fmt::format("{} in {} s{}", found ? "found each other, their topics did not match" : "did not find each other",
+                     kMeeting.count(), participant.possible_cause()),
+         remedy_for_strangers(pair, found)}};
   }
   caller.settle(Clock::now() + kSettling);  // whether answers come at all is for the samples to say
   std::vector<Check> checks{{"participants", Verdict::kOk, fmt::format("found each other in {:.2f} s", took), ""}};

@@ -14,6 +14,7 @@ namespace {
 constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string_view>>({
     {"bag", "look into recordings, check, save and export them"},
     {"bench", "measure physics, pools and planners on this machine"},
+    {"bridge", "drive a robot by its own protocols"},
     {"coordinator", "plan and re-plan with a pool of workers"},
     {"discovery-server", "introduce machines to each other where there is no multicast"},
     {"doctor", "say what is wrong with this machine, and the remedy"},
@@ -29,6 +30,7 @@ constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string
     {"scene", "make, check, disturb and show scene files"},
     {"sim", "simulate the world in which actions happen"},
     {"train-coarse", "train the learned coarse model of pushing"},
+    {"ur-sim", "simulate a UR5 and its gripper behind their own protocols"},
     {"worker", "simulate rollouts for whoever asks"},
     {"workers", "list the workers of a domain, and whom they serve"},
 });

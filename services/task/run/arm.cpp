@@ -1,0 +1,73 @@
+#include "services/task/run/arm.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <utility>
+
+#include "services/task/run/options.hpp"
+#include "services/world/arm/arm_scene.hpp"
+
+namespace jostle::task {
+namespace {
+
+// An address of this host's own for each domain, so that several runs have controllers with the same ports.
+std::string controller_address(int domain) { return fmt::format("127.0.1.{}", domain + 1); }
+
+}  // namespace
+
+Result<Arm> parse_arm(const std::string& text) {
+  constexpr std::string_view kUr = "ur:";
+  if (text == "sim") return Arm{};
+  if (text == "ur-sim") return Arm{.kind = Arm::Kind::kUrSim, .host = {}};
+  if (text.starts_with(kUr) && text.size() > kUr.size())
+    return Arm{.kind = Arm::Kind::kUr, .host = text.substr(kUr.size())};
+  return Error{Code::kInvalidArgument, fmt::format("--arm: got '{}', wanted sim, ur-sim or ur:HOST", text)};
+}
+
+std::vector<Part> parts_of_world(const RunOptions& options, const std::filesystem::path& scene,
+                                 const std::filesystem::path& belief, int domain) {
+  const std::vector<std::string> of_run{"--domain", std::to_string(domain), "--die-with-parent",
+                                        std::to_string(getpid())};
+  const auto part = [&](std::string title, std::string program, std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), of_run.begin(), of_run.end());
+    return Part{std::move(title), std::move(program), std::move(arguments)};
+  };
+  const auto bridge = [&](const std::string& host) { return part("the bridge", "bridge", {"ur5", "--host", host}); };
+  switch (options.arm.kind) {
+    case Arm::Kind::kUr:
+      return {bridge(options.arm.host)};
+    case Arm::Kind::kUrSim: {
+      const std::string address = controller_address(domain);
+      return {part("the simulated arm", "ur_sim", {scene.string(), "--address", address}), bridge(address)};
+    }
+    case Arm::Kind::kSim:
+      break;
+  }
+  return {part("the simulated world", "sim",
+               {scene.string(), "--belief", belief.string(), "--uncertainty", physics_pool::to_string(options.level),
+                "--seed", std::to_string(options.seed), "--rate", fmt::format("{}", options.rate)})};
+}
+
+std::chrono::seconds patience(const Arm& arm) {
+  return std::chrono::seconds(arm.kind == Arm::Kind::kSim ? 15
+                                                          : 45);  // an arm is switched on, and its gripper activated
+}
+
+Result<Drawn> drawn(const Arm& arm, const physics_pool::Scene& scene, const std::vector<std::vector<double>>& states) {
+  if (arm.kind == Arm::Kind::kSim) return Drawn{scene, states};
+  auto scene_result = world::with_arm(scene, {});
+  if (!scene_result) return scene_result.error();
+  Drawn result{std::move(scene_result).value(), {}};
+  const std::size_t joints = scene.robot.q.size();
+  for (const std::vector<double>& state : states) {
+    auto q_result = world::arm_joints(std::span(state).first(joints), {});
+    if (!q_result) return q_result.error();
+    result.states.push_back(std::move(q_result).value());
+    result.states.back().insert(result.states.back().end(), state.begin() + static_cast<std::ptrdiff_t>(joints),
+                                state.end());
+  }
+  return result;
+}
+
+}  // namespace jostle::task

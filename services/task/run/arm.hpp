@@ -1,0 +1,55 @@
+#pragma once
+/// \file
+/// What the commands of a run move: a simulated world, or an arm behind its own protocols.
+
+#include <chrono>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "idl/types/result.hpp"
+#include "physics_pool/scene/scene.hpp"
+
+namespace jostle::task {
+
+struct RunOptions;
+
+/// What `--arm` names.
+struct Arm {
+  enum class Kind {
+    kSim,    ///< the planner's own robot, in a simulated world
+    kUrSim,  ///< a UR5 behind a simulated controller
+    kUr      ///< a UR5
+  };
+  Kind kind = Kind::kSim;
+  std::string host;  ///< of a UR5's controller
+};
+
+/// Reads "sim", "ur-sim" or "ur:HOST".
+/// Error kInvalidArgument.
+Result<Arm> parse_arm(const std::string& text);
+
+/// A program that a run starts.
+struct Part {
+  std::string title;    ///< "the simulated world"
+  std::string program;  ///< "sim"
+  std::vector<std::string> arguments;
+};
+
+/// Returns what must run for the commands to move something, in the order of their start. `scene`, `belief`: files.
+std::vector<Part> parts_of_world(const RunOptions& options, const std::filesystem::path& scene,
+                                 const std::filesystem::path& belief, int domain);
+
+/// Returns how long it may take until it is heard.
+std::chrono::seconds patience(const Arm& arm);
+
+/// Returns the scene as it is to be drawn, and turns the robot's part of states [nq] of the planner's scene into that
+/// scene's.
+/// Error kInvalidArgument: a state that the arm cannot have.
+struct Drawn {
+  physics_pool::Scene scene;
+  std::vector<std::vector<double>> states;
+};
+Result<Drawn> drawn(const Arm& arm, const physics_pool::Scene& scene, const std::vector<std::vector<double>>& states);
+
+}  // namespace jostle::task

@@ -1,0 +1,209 @@
+// jostle ur-sim: a UR5 with a Robotiq gripper that is simulated, with physics, behind the real ones' protocols.
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <chrono>
+#include <thread>
+
+#include "physics_pool/uncertainty/belief.hpp"
+#include "robot_bridge/ur/dashboard.hpp"
+#include "robot_bridge/ur/primary.hpp"
+#include "robot_bridge/ur_sim/dashboard_server.hpp"
+#include "robot_bridge/ur_sim/gripper_server.hpp"
+#include "robot_bridge/ur_sim/rtde_server.hpp"
+#include "robot_bridge/ur_sim/script_server.hpp"
+#include "services/common/process/command_line.hpp"
+#include "services/common/process/program.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
+#include "services/world/arm/arm_scene.hpp"
+#include "services/world/in_process/in_process_world.hpp"
+#include "services/world/link/messages.hpp"
+#include "services/world/ur_sim/plant.hpp"
+
+namespace {
+
+using namespace jostle;
+using namespace jostle::world;
+namespace ur_sim = robot_bridge::ur_sim;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kEyes = std::chrono::milliseconds(10);  // between two measurements of the objects
+
+// What cameras would see of the objects, stamped with the time of day.
+class Eyes {
+ public:
+  Eyes(const wire::Participant& participant, const physics_pool::Scene& scene)
+      : scene_(scene),
+        objects_(participant, wire::topics::kObjectStates),
+        poses_(participant, wire::topics::kObjectPoses),
+        transforms_(participant, wire::topics::kTransforms) {}
+
+  void look(const physics_pool::ExecutionWorld& world) {
+    const auto now = Clock::now();
+    if (now < next_) return;
+    next_ = now + kEyes;
+    const std::chrono::duration<double> time = std::chrono::system_clock::now().time_since_epoch();
+    const auto& layout = world.world().geometry().layout;
+    const auto message = to_message(object_readings(layout, world.state()), time.count());
+    (void)objects_.write(message);
+    if (++looks_ % 10 != 0) return;
+    (void)poses_.write(pose_array_message(message));
+    (void)transforms_.write(transform_message(message));
+  }
+
+ private:
+  const physics_pool::Scene& scene_;
+  Clock::time_point next_{};
+  long looks_ = 0;
+  wire::Writer<jostle_msgs::msg::ObjectStates> objects_;
+  wire::Writer<geometry_msgs::msg::PoseArray> poses_;
+  wire::Writer<tf2_msgs::msg::TFMessage> transforms_;
+};
+
+struct Options {
+  std::string scene_file, address = "127.0.0.1", generation = "cb3";
+  bool has_eyes = true;
+};
+
+// The controller and what serves it; everything happens in run().
+class Machine {
+ public:
+  explicit Machine(physics_pool::WorldPtr world, const ur_sim::Generation& generation)
+      : plant_(std::move(world)), controller_(plant_, generation), gripper_(plant_) {
+    controller_.opening_rate = [this](double dt) { return gripper_.opening_rate(dt); };
+    controller_.on_event = [this](const ur_sim::Controller::Event& event) {
+      spdlog::info("{}", describe(event));
+      if (primary_) primary_->tell(event);
+    };
+  }
+
+  Result<void> listen(const std::string& address) {
+    using namespace robot_bridge;
+    auto rtde = ur_sim::RtdeServer::listen(context_, controller_, address, ur::rtde::kPort);
+    if (!rtde) return rtde.error();
+    rtde_ = std::move(rtde).value();
+    auto primary = ur_sim::ScriptServer::listen(context_, controller_, address, ur::primary::kPort, true);
+    if (!primary) return primary.error();
+    primary_ = std::move(primary).value();
+    auto secondary = ur_sim::ScriptServer::listen(context_, controller_, address, ur::primary::kSecondaryPort, false);
+    if (!secondary) return secondary.error();
+    secondary_ = std::move(secondary).value();
+    auto dashboard = ur_sim::serve_dashboard(context_, controller_, address, ur::kDashboardPort);
+    if (!dashboard) return dashboard.error();
+    dashboard_ = std::move(dashboard).value();
+    auto gripper = ur_sim::serve_gripper(context_, gripper_, address, robotiq::kPort);
+    if (!gripper) return gripper.error();
+    gripper_server_ = std::move(gripper).value();
+    return {};
+  }
+
+  // In real time. A machine that is too slow makes the arm slow, not jumpy: time that was missed is not made up for.
+  Result<void> run(Eyes* eyes, std::stop_token stop) {
+    const auto cycle =
+        std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(controller_.generation().cycle));
+    auto next = Clock::now();
+    int boots = controller_.boots();
+    while (!stop.stop_requested()) {
+      next = std::max(next + cycle, Clock::now() - 5 * cycle);
+      if (context_.stopped()) context_.restart();
+      context_.run_until(next);
+      if (const auto left = next - Clock::now(); left > Clock::duration::zero()) std::this_thread::sleep_for(left);
+      if (auto ok = controller_.tick(); !ok) return ok;
+      if (boots != controller_.boots()) {
+        boots = controller_.boots();
+        rtde_->drop_clients();
+        primary_->drop_clients();
+        secondary_->drop_clients();
+      }
+      rtde_->publish();
+      primary_->publish();
+      secondary_->publish();
+      if (eyes) eyes->look(plant_.world());
+    }
+    return {};
+  }
+
+ private:
+  static std::string describe(const ur_sim::Controller::Event& event) {
+    using Kind = ur_sim::Controller::Event::Kind;
+    switch (event.kind) {
+      case Kind::kProgramStarted:
+        return fmt::format("program {} started", event.text);
+      case Kind::kProgramStopped:
+        return fmt::format("program {} stopped", event.text);
+      case Kind::kError:
+        break;
+    }
+    return event.text;
+  }
+
+  boost::asio::io_context context_{1};
+  WorldPlant plant_;
+  ur_sim::Controller controller_;
+  ur_sim::Gripper gripper_;
+  std::unique_ptr<ur_sim::RtdeServer> rtde_;
+  std::unique_ptr<ur_sim::ScriptServer> primary_, secondary_;
+  std::unique_ptr<robot_bridge::net::TcpServer> dashboard_, gripper_server_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Simulates a UR5 with a Robotiq gripper: its controller's protocols, and the physics of its scene.",
+               "jostle ur-sim");
+  Options options;
+  common::ProcessOptions process;
+  app.add_option("scene", options.scene_file, "Scene file of a planar gripper; the arm holds its hand there")
+      ->required();
+  app.add_option("--address", options.address, "IPv4 address to listen at")->capture_default_str();
+  auto* generation = app.add_option("--controller", options.generation, "cb3: 125 Hz; e-series: 500 Hz, remote control")
+                         ->capture_default_str()
+                         ->check(CLI::IsMember({"cb3", "e-series"}));
+  common::suggest(generation, {"cb3", "e-series"});
+  app.add_flag("!--no-eyes", options.has_eyes, "Do not publish where the objects are");
+  common::add_process_options(app, process);
+  app.footer(
+      "Ports: 29999 dashboard, 30001 primary, 30002 secondary, 30004 RTDE, 63352 gripper.\n"
+      "It has no interpreter of URScript: it knows programs that obey registers (`jostle bridge` uploads one), and "
+      "lists of "
+      "movej, servoj, speedj, stopj, sleep.\n"
+      "Exit codes: 0 stopped by a signal, 2 bad input, 3 a port is taken or the physics failed.");
+  if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
+  common::die_with_parent(process.parent);
+  const common::StopSignal signal;
+  common::set_up_logging("ur-sim");
+  const auto fail = [](const Error& error) {
+    spdlog::error("{}", error.message);
+    return common::exit_code_of(error);
+  };
+  auto scene_result = physics_pool::load_scene(options.scene_file);
+  if (!scene_result) return fail(scene_result.error());
+  auto arm_result = with_arm(*scene_result, {});
+  if (!arm_result) return fail(arm_result.error());
+  auto world_result = physics_pool::World::compile(*arm_result);
+  if (!world_result) return fail(world_result.error());
+  const auto& kind = options.generation == "cb3" ? ur_sim::Generation::cb3() : ur_sim::Generation::e_series();
+  Machine machine(*world_result, kind);
+  if (auto ok = machine.listen(options.address); !ok) return fail(ok.error());
+  try {
+    std::optional<wire::Participant> participant;
+    std::unique_ptr<Eyes> eyes;
+    if (options.has_eyes) {
+      auto participant_result = wire::Participant::open(
+          {.name = "jostle_ur_sim", .domain = process.domain, .role = wire::Role::kRobot, .waits_for_server = true});
+      if (!participant_result) return fail(participant_result.error());
+      participant.emplace(*participant_result);
+      eyes = std::make_unique<Eyes>(*participant, *scene_result);
+    }
+    spdlog::info("{} ready at {}: scene '{}'", kind.model, options.address, scene_result->name);
+    if (auto ok = machine.run(eyes.get(), signal.token()); !ok) return fail(ok.error());
+    return common::kExitOk;
+  } catch (const wire::SetupError& error) {
+    return fail({Code::kUnavailable, error.what()});
+  }
+}

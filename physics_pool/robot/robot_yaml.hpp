@@ -22,7 +22,7 @@ RobotModel read_robot(yaml::Fields& fields);
 /// reading it back gives the same model bit for bit.
 std::string robot_text(const RobotModel& model, int indent);
 
-/// Returns a model that comes with every program: planar_gripper, pusher.
+/// Returns a model that comes with every program: planar_gripper, pusher, ur5_2f85.
 /// Error kNotFound naming those there are.
 Result<RobotModel> builtin_robot(std::string_view name);
 

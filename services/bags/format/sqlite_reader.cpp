@@ -266,7 +266,7 @@ class SqliteReader final : public FileReader {
         return {};
       }
       // One that is found and cannot be read after all is passed over, too.
-      const std::int64_t passed = last == before ? std::max(*next, last + leap) : *next - 1;
+      const std::int64_t passed = last == before ? std::max(*next, last + leap) : std::max(*next - 1, last);
       leap = last == before ? 2 * leap : 1;
       if (passed > last) {
         info_.findings.lost(Part::kMessage, "damaged pages", where, static_cast<std::uint64_t>(passed - last));

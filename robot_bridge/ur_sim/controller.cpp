@@ -28,7 +28,20 @@ constexpr double kDeceleration = 15.0;  // rad/s², where a program ends or says
 constexpr double kMostDeviation = 0.5;  // rad, behind its target: it hit something
 
 // Codes of the registers' contract.
-enum Command : int { kMove = 1, kSpeedJ = 9, kServoJ = 11, kStopSpeed = 15, kStopServo = 16, kStopJ = 34, kExit = 255 };
+enum Command : int {
+  kMove = 1,
+  kLine = 3,
+  kSpeedJ = 9,
+  kSpeedL = 10,
+  kServoJ = 11,
+  kStopSpeed = 15,
+  kStopServo = 16,
+  kStopL = 33,
+  kStopJ = 34,
+  kProtectiveStop = 31,
+  kSetWatchdog = 35,
+  kExit = 255
+};
 constexpr int kReadyState = 1, kDoneState = 2;
 
 Joints joints_of(const std::array<double, Controller::kRegisters>& registers, int first) {
@@ -49,6 +62,24 @@ std::string without_blanks(std::string line) {
   return line;
 }
 
+// The three sockets of the external-control contract, if a program opens them.
+std::optional<Program::External> external_of(const std::string& text) {
+  static const std::regex kOpen(R"re(socket_open\(\s*"([^"]+)"\s*,\s*(\d+)\s*,\s*"(\w+)"\s*\))re");
+  Program::External external;
+  for (auto open = std::sregex_iterator(text.begin(), text.end(), kOpen); open != std::sregex_iterator(); ++open) {
+    const std::string name = (*open)[3];
+    const auto port = parse_whole<int>((*open)[2].str(), 1, 65535);
+    if (!port) continue;
+    external.host = (*open)[1];
+    std::uint16_t& place = name.starts_with("trajectory")       ? external.trajectory
+                           : name.starts_with("script_command") ? external.script_command
+                                                                : external.reverse;
+    place = static_cast<std::uint16_t>(*port);
+  }
+  if (external.reverse == 0 || external.trajectory == 0) return {};
+  return external;
+}
+
 }  // namespace
 
 const Generation& Generation::cb3() {
@@ -65,15 +96,23 @@ const Generation& Generation::e_series() {
 Result<Program> parse_program(const std::string& text) {
   static const std::regex kHead(R"((?:def|sec)\s+(\w+)\s*\(\s*\)\s*:)");
   static const std::regex kRegister(R"(read_input_integer_register\(\s*(\d+)\s*\))");
+  static const std::regex kOffset(R"(reg_offset_int\s*=\s*(\d+))");
   static const std::regex kWatchdog(R"re(rtde_set_watchdog\(\s*"input_int_register_(\d+)"\s*,\s*([0-9.]+))re");
   Program program{.name = "unnamed", .text = text};
   std::smatch match;
   if (std::regex_search(text, match, kHead)) program.name = match[1];
-  if (std::regex_search(text, match, kRegister)) {
-    program.registers = parse_whole<int>(match[1].str(), 0, Controller::kRegisters - 12);
+  if (auto external = external_of(text)) {
+    program.external = std::move(external);
+    return program;
+  }
+  if (text.find("read_input_integer_register(") != text.npos) {
+    // By a number, or by one behind an offset that stands in the text.
+    const bool has_offset = std::regex_search(text, match, kOffset);
+    const std::string first = has_offset || std::regex_search(text, match, kRegister) ? match[1].str() : "0";
+    program.registers = parse_whole<int>(first, 0, Controller::kRegisters - 12);
     if (!program.registers) {
       return Error{Code::kInvalidArgument, fmt::format("program '{}': got register {}, wanted 0 to {}", program.name,
-                                                       match[1].str(), Controller::kRegisters - 12)};
+                                                       first, Controller::kRegisters - 12)};
     }
     // Who counts its commands in the second register wants each one obeyed at once.
     program.streams = text.find(fmt::format("read_input_integer_register({})", *program.registers + 1)) != text.npos;
@@ -222,6 +261,7 @@ void Controller::run(Program program) {
     output_ints_[base + 1] = 0;
   }
   say(Event::Kind::kProgramStarted, program_.name);
+  if (program_.external && on_external) on_external(*program_.external);
 }
 
 void Controller::end_program(const std::string&) {
@@ -265,25 +305,45 @@ void Controller::obey_registers() {
     motion_code_ = command;
     switch (command) {
       case kMove:
-        motion_.begin(MoveJ{.q = six, .a = seventh > 0 ? eighth : 1.4, .v = seventh});
+        motion_.begin(MoveJ{.q = six, .a = eighth, .v = seventh});
+        break;
+      case kLine:
+        motion_.begin(MoveL{.pose = six, .a = eighth, .v = seventh});
         break;
       case kSpeedJ:
         motion_.begin(SpeedJ{.qd = six, .a = seventh, .t = eighth});
+        break;
+      case kSpeedL:
+        motion_.begin(SpeedL{.xd = six, .a = seventh, .t = eighth});
         break;
       case kServoJ:
         motion_.begin(ServoJ{.q = six, .t = std::max(eighth, generation_.cycle)});
         break;
       case kStopSpeed:
       case kStopServo:
+      case kStopL:
       case kStopJ:
-        motion_.begin(StopJ{input_doubles_[base]});
+        motion_.begin(StopJ{std::max(input_doubles_[base], 1.0)});
+        break;
+      case kProtectiveStop:
+        return protective_stop("asked for by its program");
+      case kSetWatchdog:
+        program_.watchdog = std::max(0.0, input_doubles_[base]);
         break;
       default:
         break;  // what is set, not moved: payload, tool, …
     }
   }
-  const bool streams = command == kSpeedJ || command == kServoJ;
-  if (streams || motion_.is_done()) output_ints_[base] = streams ? kReadyState : kDoneState;
+  // Speeds and servo targets are taken at once, and so is a motion that is not waited for.
+  const bool streams = command == kSpeedJ || command == kSpeedL || command == kServoJ;
+  const bool moves = command == kMove || command == kLine;
+  const bool is_asynchronous = moves && input_ints_[base + 1] == 1;
+  const bool waits = moves || command == kStopJ || command == kStopL || command == kStopSpeed || command == kStopServo;
+  if (streams) {
+    output_ints_[base] = kReadyState;
+  } else if (!waits || is_asynchronous || motion_.is_done()) {
+    output_ints_[base] = kDoneState;
+  }
 }
 
 void Controller::run_motions() {
@@ -311,7 +371,7 @@ Result<void> Controller::tick() {
       end_program("watchdog");
     } else if (program_.registers) {
       obey_registers();
-    } else {
+    } else if (!program_.external) {
       run_motions();
     }
   }

@@ -39,7 +39,13 @@ struct Program {
   std::optional<int> registers;  ///< the first register that it obeys, of a program that does
   bool streams = false;          ///< of those: whether it obeys each cycle, or once and waits to be told 0
   double watchdog = 0.0;         ///< Hz that the first register must be written with; 0: nobody watches
-  std::vector<Motion> motions;   ///< of the others
+  /// Where a program of the external-control contract connects to: who commands it.
+  struct External {
+    std::string host;
+    std::uint16_t reverse = 0, trajectory = 0, script_command = 0;  ///< ports
+  };
+  std::optional<External> external;
+  std::vector<Motion> motions;  ///< of the others
 };
 
 /// Reads an uploaded text: a `def NAME(): … end`, or a single line.
@@ -77,6 +83,14 @@ class Controller {
 
   /// Runs an uploaded program in place of the one that runs.
   void run(Program program);
+
+  /// What a program of the external-control contract does: begins a motion, asks whether it is done.
+  void begin(const Motion& motion) { motion_.begin(motion); }
+  bool motion_is_done() const { return motion_.is_done(); }
+  const Joints& target() const { return motion_.q(); }         ///< rad
+  const Joints& target_speed() const { return motion_.qd(); }  ///< rad/s
+  /// Is called when such a program starts.
+  std::function<void(const Program::External&)> on_external;
 
   // --- state -----------------------------------------------------------------------
   const Generation& generation() const { return generation_; }

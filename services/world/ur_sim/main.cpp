@@ -13,6 +13,7 @@
 #include "robot_bridge/ur/dashboard.hpp"
 #include "robot_bridge/ur/primary.hpp"
 #include "robot_bridge/ur_sim/dashboard_server.hpp"
+#include "robot_bridge/ur_sim/external_control.hpp"
 #include "robot_bridge/ur_sim/gripper_server.hpp"
 #include "robot_bridge/ur_sim/rtde_server.hpp"
 #include "robot_bridge/ur_sim/script_server.hpp"
@@ -113,6 +114,7 @@ class Machine {
       if (context_.stopped()) context_.restart();
       context_.run_until(next);
       if (const auto left = next - Clock::now(); left > Clock::duration::zero()) std::this_thread::sleep_for(left);
+      external_.tick();
       if (auto ok = controller_.tick(); !ok) return ok;
       if (boots != controller_.boots()) {
         boots = controller_.boots();
@@ -146,6 +148,7 @@ class Machine {
   WorldPlant plant_;
   ur_sim::Controller controller_;
   ur_sim::Gripper gripper_;
+  ur_sim::ExternalControl external_{context_, controller_};
   std::unique_ptr<ur_sim::RtdeServer> rtde_;
   std::unique_ptr<ur_sim::ScriptServer> primary_, secondary_;
   std::unique_ptr<robot_bridge::net::TcpServer> dashboard_, gripper_server_;

@@ -33,13 +33,16 @@ std::vector<Part> parts_of_world(const RunOptions& options, const std::filesyste
     arguments.insert(arguments.end(), of_run.begin(), of_run.end());
     return Part{std::move(title), std::move(program), std::move(arguments)};
   };
-  const auto bridge = [&](const std::string& host) { return part("the bridge", "bridge", {"ur5", "--host", host}); };
+  // A simulated arm may wait longer for a commander on a machine whose workers take all cores.
+  const auto bridge = [&](const std::string& host, const char* silence) {
+    return part("the bridge", "bridge", {"ur5", "--host", host, "--silence", silence});
+  };
   switch (options.arm.kind) {
     case Arm::Kind::kUr:
-      return {bridge(options.arm.host)};
+      return {bridge(options.arm.host, "0.07")};
     case Arm::Kind::kUrSim: {
       const std::string address = controller_address(domain);
-      return {part("the simulated arm", "ur_sim", {scene.string(), "--address", address}), bridge(address)};
+      return {part("the simulated arm", "ur_sim", {scene.string(), "--address", address}), bridge(address, "1")};
     }
     case Arm::Kind::kSim:
       break;

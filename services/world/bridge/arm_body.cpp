@@ -1,6 +1,7 @@
 #include "services/world/bridge/arm_body.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
@@ -26,8 +27,8 @@ constexpr const char* kJointNames[] = {"shoulder_pan_joint", "shoulder_lift_join
 }  // namespace
 
 ArmBody::ArmBody(const wire::Participant& participant, robot_bridge::ur::PlanarArm& arm,
-                 robot_bridge::robotiq::Client* gripper)
-    : arm_(arm), gripper_(gripper), joints_(participant, wire::topics::kJointStates) {
+                 robot_bridge::robotiq::Client* gripper, std::chrono::milliseconds patience)
+    : arm_(arm), gripper_(gripper), patience_(patience), joints_(participant, wire::topics::kJointStates) {
   hand_.opening = opening_ = robot_bridge::robotiq::kStroke;
 }
 
@@ -86,7 +87,11 @@ void ArmBody::halt() {
 }
 
 Result<bool> ArmBody::rest() {
-  refresh();
+  const std::string now = trouble();
+  if (now != said_) {
+    now.empty() ? spdlog::info("the arm is ready again") : spdlog::warn("{}", now);
+    said_ = now;
+  }
   return false;
 }
 

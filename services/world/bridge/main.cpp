@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cmath>
 #include <optional>
 
 #include "services/common/process/command_line.hpp"
@@ -22,7 +23,7 @@ int main(int argc, char** argv) {
   robot_bridge::ur::PlanarArmOptions arm_options;
   robot_bridge::robotiq::Client::Options gripper_options;
   std::string gripper = "robotiq";
-  double patience = 30.0;
+  double patience = 30.0, silence = 0.07;
   auto* ur5 = app.add_subcommand("ur5", "A UR5 or UR5e, whose hand moves level above a surface");
   ur5->add_option("--host", arm_options.host, "The controller's address or name")->capture_default_str();
   ur5->add_option("--gripper", gripper, "robotiq: a 2F-85 at the controller's port 63352; none")
@@ -39,6 +40,9 @@ int main(int argc, char** argv) {
   ur5->add_option("--patience", patience, "Seconds that the arm may take to get ready")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 3600.0));
+  ur5->add_option("--silence", silence, "Seconds of a commander's silence that end a motion")
+      ->capture_default_str()
+      ->check(CLI::Range(0.02, 10.0));
   common::add_process_options(*ur5, process);
   app.footer("Exit codes: 0 stopped by a signal, 2 bad input, 3 the robot is not there or does not get ready.");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
@@ -60,7 +64,8 @@ int main(int argc, char** argv) {
     gripper_options.host = arm_options.host;
     std::optional<robot_bridge::robotiq::Client> client;
     if (gripper == "robotiq") client.emplace(gripper_options);
-    ArmBody body(*participant_result, arm, client ? &*client : nullptr);
+    ArmBody body(*participant_result, arm, client ? &*client : nullptr,
+                 std::chrono::milliseconds(std::lround(1e3 * silence)));
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience);
     std::string said;
     for (std::string trouble; !(trouble = body.trouble()).empty();) {

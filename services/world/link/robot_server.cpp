@@ -14,9 +14,8 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kPublicationPeriod{50};  // of wall-clock time
-constexpr std::size_t kCommandQueue = 64;                    // of one participant
-constexpr std::size_t kPastEpochs = 64;                      // remembered, for commands that are late
+constexpr std::size_t kCommandQueue = 64;  // of one participant
+constexpr std::size_t kPastEpochs = 64;    // remembered, for commands that are late
 
 }  // namespace
 
@@ -66,14 +65,16 @@ void RobotServer::say_troubles() {
 }
 
 // While an action is at work: whether its commander has had enough of it.
-bool RobotServer::told_to_stop() {
+bool RobotServer::told_to_stop(const Action& action) {
   bool told = false;
   for (Letter& letter : commands_.take_letters()) {
     if (letter.writer != commander_) {
       make_wait(std::move(letter));
       continue;
     }
+    heard_ = steady_clock::now();
     const auto& command = letter.sample;
+    if (command.epoch() == action.epoch && command.sequence_number() == action.sequence_number) continue;  // repeated
     told = told || (is_stop(command) && command.epoch() == epoch_ && command.sequence_number() > accepted_);
     waiting_.push_back(std::move(letter));
     if (waiting_.size() > kCommandQueue) waiting_.pop_front();  // as the inbox does
@@ -106,6 +107,7 @@ void RobotServer::accept(Letter letter) {
   const auto& command = letter.sample;
   const bool known = letter.writer == commander_ && command.epoch() == epoch_;
   const bool over = !known && std::ranges::find(past_epochs_, command.epoch()) != past_epochs_.end();
+  if (known && command.sequence_number() == accepted_) return;  // repeated, and came when it was done
   if (over || (known && command.sequence_number() <= accepted_)) {
     stale_.note("command {}/{} is stale, dropped", command.epoch(), command.sequence_number());
     return;
@@ -174,10 +176,16 @@ Result<void> RobotServer::act(const Action& action, std::stop_token stop) {
 
 Result<void> RobotServer::move(const Action& action, std::stop_token stop) {
   if (auto ok = body_.begin(action.u, action.duration); !ok) return ok;
+  heard_ = steady_clock::now();
   while (!body_.is_over()) {
-    if (stop.stop_requested() || told_to_stop()) {
+    if (stop.stop_requested() || told_to_stop(action)) {
       body_.halt();
       break;
+    }
+    if (const auto patience = body_.patience(); patience && steady_clock::now() - heard_ > *patience) {
+      body_.halt();
+      return Error{Code::kUnavailable,
+                   fmt::format("its commander was not heard for {} ms; the motion was ended", patience->count())};
     }
     publish_when_due();  // before the last step: its state is the next measurement's
     if (auto ok = body_.advance(); !ok) return ok;
@@ -199,7 +207,7 @@ void RobotServer::publish_when_due() {
 }
 
 void RobotServer::publish() {
-  next_publication_ = steady_clock::now() + kPublicationPeriod;
+  next_publication_ = steady_clock::now() + body_.period();
   body_.publish();
   const robot_bridge::RobotReading reading = body_.reading();
   jostle_msgs::msg::RobotStatus status;
@@ -212,7 +220,7 @@ void RobotServer::publish() {
   status.q(reading.q);
   status.v(reading.v);
   status.limits(limits_);
-  // A state: when one is lost, the next one follows within kPublicationPeriod and says as much. It comes last: who sees
+  // A state: when one is lost, the next one follows soon and says as much. It comes last: who sees
   // a command finished finds its objects sent.
   (void)status_.write(status);
 }

@@ -44,6 +44,12 @@ class Body {
   /// No motion is at work: lets a little time go by, or returns false where it stands still, or needs nobody to go by.
   virtual Result<bool> rest() = 0;
 
+  /// Returns how long its commander may be silent while a motion is at work, before the motion is ended; nothing where
+  /// that does no harm. Commanders repeat a command each time they hear that it is at work.
+  virtual std::optional<std::chrono::milliseconds> patience() const { return {}; }
+  /// Returns the time between two statuses, by the wall clock.
+  virtual std::chrono::milliseconds period() const { return std::chrono::milliseconds(50); }
+
   /// Returns s of the clock that stamps are of.
   virtual double time() const = 0;
   virtual robot_bridge::RobotReading reading() const = 0;
@@ -58,8 +64,8 @@ class Body {
 /// good command is, and a newcomer that comes sooner waits for some seconds. A commander's new
 /// epoch ends its old one for good. Commands carry a sequence number; one that is done already is
 /// counted and dropped, a bad one of the commander is refused in `RobotStatus.error`.
-/// A stop (messages.hpp) ends the command at work at once; everything else waits
-/// for its turn. The robot stands still when no command is at work.
+/// A stop (messages.hpp) ends the command at work at once, and so does a commander's silence if the body wants it;
+/// everything else waits for its turn. The robot stands still when no command is at work.
 class RobotServer {
  public:
   RobotServer(const wire::Participant& participant, Body& body);
@@ -82,7 +88,7 @@ class RobotServer {
   };
 
   void receive();
-  bool told_to_stop();
+  bool told_to_stop(const Action& action);
   bool may_command(const Letter& letter) const;
   void make_wait(Letter letter);
   void accept(Letter letter);
@@ -111,6 +117,7 @@ class RobotServer {
   bool busy_ = false;
   std::string error_;
   std::chrono::steady_clock::time_point next_publication_;
+  std::chrono::steady_clock::time_point heard_;  // the commander, while a motion is at work
 
   wire::Writer<jostle_msgs::msg::RobotStatus> status_;
   wire::Inbox<jostle_msgs::msg::VelocityCommand> commands_;

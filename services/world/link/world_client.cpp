@@ -100,13 +100,17 @@ Result<void> RobotClient::wait_for_robot(std::stop_token stop) {
   return {};
 }
 
-Result<void> RobotClient::wait_until_finished(std::stop_token stop) {
+Result<void> RobotClient::wait_until_finished(const jostle_msgs::msg::VelocityCommand& command, std::stop_token stop) {
   auto idle_since = steady_clock::now();
   for (;;) {
     auto status_result = next_status(stop);
     if (!status_result) return status_result.error();
     const auto now = steady_clock::now();
-    if (status_result->busy()) idle_since = now;
+    if (status_result->busy()) {
+      idle_since = now;
+      // A robot that can do harm wants to hear that somebody is still there. When it is not sent, it will miss it.
+      if (status_result->epoch() == epoch_) (void)command_.write(command);
+    }
     if (now - idle_since > options_.start) return not_taken(*status_result);
     if (status_result->epoch() != epoch_) continue;
     const bool finished = status_result->sequence_number() >= sequence_number_;
@@ -160,7 +164,7 @@ Result<void> RobotClient::execute(std::span<const double> u, double duration, st
   if (!command_.write(command)) {
     return Error{Code::kUnavailable, "robot: the middleware took no command on " + wire::topics::kRobotCommand.name};
   }
-  auto ok = wait_until_finished(stop);
+  auto ok = wait_until_finished(command, stop);
   if (ok || ok.error().code != Code::kCancelled) return ok;
   if (auto halted = halt(); !halted) return halted;
   return ok;

@@ -58,7 +58,7 @@ class RobotClient final : public robot_bridge::Robot {
   Result<void> wait_for_robot(std::stop_token stop);
 
   /// Waits until the command of sequence_number_ is finished or refused.
-  Result<void> wait_until_finished(std::stop_token stop);
+  Result<void> wait_until_finished(const jostle_msgs::msg::VelocityCommand& command, std::stop_token stop);
   Error not_taken(const jostle_msgs::msg::RobotStatus& status) const;
 
   /// Makes the robot stand still. Error kUnavailable: it does not say that it does.

@@ -15,6 +15,7 @@
 #include "robot_bridge/ur_sim/dashboard_server.hpp"
 #include "robot_bridge/ur_sim/external_control.hpp"
 #include "robot_bridge/ur_sim/gripper_server.hpp"
+#include "robot_bridge/ur_sim/pendant.hpp"
 #include "robot_bridge/ur_sim/rtde_server.hpp"
 #include "robot_bridge/ur_sim/script_server.hpp"
 #include "services/common/process/command_line.hpp"
@@ -69,6 +70,7 @@ class Eyes {
 struct Options {
   std::string scene_file, address = "127.0.0.1", generation = "cb3";
   bool has_eyes = true;
+  std::uint16_t pendant = 0;  // port; 0: none
 };
 
 // The controller and what serves it; everything happens in run().
@@ -83,7 +85,7 @@ class Machine {
     };
   }
 
-  Result<void> listen(const std::string& address) {
+  Result<void> listen(const std::string& address, std::uint16_t pendant_port) {
     using namespace robot_bridge;
     auto rtde = ur_sim::RtdeServer::listen(context_, controller_, address, ur::rtde::kPort);
     if (!rtde) return rtde.error();
@@ -100,6 +102,10 @@ class Machine {
     auto gripper = ur_sim::serve_gripper(context_, gripper_, address, robotiq::kPort);
     if (!gripper) return gripper.error();
     gripper_server_ = std::move(gripper).value();
+    if (pendant_port == 0) return {};
+    auto pendant = ur_sim::serve_pendant(context_, controller_, address, pendant_port);
+    if (!pendant) return pendant.error();
+    pendant_ = std::move(pendant).value();
     return {};
   }
 
@@ -151,7 +157,7 @@ class Machine {
   ur_sim::ExternalControl external_{context_, controller_};
   std::unique_ptr<ur_sim::RtdeServer> rtde_;
   std::unique_ptr<ur_sim::ScriptServer> primary_, secondary_;
-  std::unique_ptr<robot_bridge::net::TcpServer> dashboard_, gripper_server_;
+  std::unique_ptr<robot_bridge::net::TcpServer> dashboard_, gripper_server_, pendant_;
 };
 
 }  // namespace
@@ -168,6 +174,9 @@ int main(int argc, char** argv) {
                          ->capture_default_str()
                          ->check(CLI::IsMember({"cb3", "e-series"}));
   common::suggest(generation, {"cb3", "e-series"});
+  app.add_option(
+      "--pendant", options.pendant,
+      "Port that takes lines: protective stop, emergency stop, restart safety, reboot, remote, local (default: none)");
   app.add_flag("!--no-eyes", options.has_eyes, "Do not publish where the objects are");
   common::add_process_options(app, process);
   app.footer(
@@ -192,7 +201,7 @@ int main(int argc, char** argv) {
   if (!world_result) return fail(world_result.error());
   const auto& kind = options.generation == "cb3" ? ur_sim::Generation::cb3() : ur_sim::Generation::e_series();
   Machine machine(*world_result, kind);
-  if (auto ok = machine.listen(options.address); !ok) return fail(ok.error());
+  if (auto ok = machine.listen(options.address, options.pendant); !ok) return fail(ok.error());
   try {
     std::optional<wire::Participant> participant;
     std::unique_ptr<Eyes> eyes;

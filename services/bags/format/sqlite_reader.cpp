@@ -19,6 +19,10 @@ constexpr std::int64_t kFarthest = std::int64_t{1} << 40;  // messages, that are
 
 constexpr int kNewestVersion = 4;
 
+// All messages behind one. By rowid, which a table has also where the name or kind of its id is damaged.
+constexpr const char* kRows =
+    "SELECT topic_id, timestamp, data, rowid FROM messages NOT INDEXED WHERE rowid > ? ORDER BY rowid";
+
 class SqliteReader final : public FileReader {
  public:
   SqliteReader(Database database, const OpenOptions& options) : database_(std::move(database)), options_(options) {}
@@ -78,8 +82,8 @@ class SqliteReader final : public FileReader {
     // The index is of times alone: where the topic's last message is known, go there at once.
     auto statement_result = database_.prepare(
         "SELECT topic_id, timestamp, data FROM messages WHERE topic_id = ? AND timestamp <= ? AND timestamp >= ? AND "
-        "id > ? AND typeof(timestamp) = 'integer' AND typeof(data) IN ('blob', 'text') "
-        "ORDER BY timestamp DESC, id DESC LIMIT 1");
+        "rowid > ? AND typeof(timestamp) = 'integer' AND typeof(data) IN ('blob', 'text') "
+        "ORDER BY timestamp DESC, rowid DESC LIMIT 1");
     if (!statement_result) return statement_result.error();
     statement_result->bind(1, ids_.at(static_cast<std::size_t>(topic)));
     statement_result->bind(2, std::min(time, span.last));
@@ -222,7 +226,8 @@ class SqliteReader final : public FileReader {
     stretches_ = {{repeated_, std::numeric_limits<std::int64_t>::max()}};
     auto rows_result = database_.prepare(
         "SELECT topic_id, min(timestamp), max(timestamp), count(*), typeof(timestamp) = 'integer' AND timestamp >= 0 "
-        "AND typeof(data) IN ('blob', 'text') AND typeof(topic_id) = 'integer' AS is_sound FROM messages WHERE id > ? "
+        "AND typeof(data) IN ('blob', 'text') AND typeof(topic_id) = 'integer' AS is_sound FROM messages WHERE rowid > "
+        "? "
         "GROUP BY topic_id, is_sound");
     if (!rows_result) return rows_result.error();
     rows_result->bind(1, repeated_);
@@ -241,7 +246,7 @@ class SqliteReader final : public FileReader {
 
   Result<void> count_repeated() {
     if (repeated_ == 0) return {};
-    auto count_result = database_.value(fmt::format("SELECT count(*) FROM messages WHERE id <= {}", repeated_));
+    auto count_result = database_.value(fmt::format("SELECT count(*) FROM messages WHERE rowid <= {}", repeated_));
     if (!count_result) return count_result.error();
     info_.repeated = std::strtoull(count_result->value_or("0").c_str(), nullptr, 10);
     return {};
@@ -249,6 +254,18 @@ class SqliteReader final : public FileReader {
 
   // As far as the table can be read: behind pages that are damaged it goes on with the next message that is there.
   Result<void> count_one_by_one() {
+    // Where the table's own description is damaged, its columns have no names to ask for; how many rows it has may be
+    // known.
+    if (auto rows_result = database_.prepare(kRows); !rows_result) {
+      const auto count_result = database_.value("SELECT count(*) FROM messages");
+      const std::uint64_t rows = count_result ? std::strtoull(count_result->value_or("0").c_str(), nullptr, 10) : 0;
+      if (rows > 0) {
+        info_.findings.lost(Part::kMessage, rows_result.error().message, "", rows);
+      } else {
+        info_.findings.lost(Part::kRecord, rows_result.error().message + ": the table of messages", "");
+      }
+      return {};
+    }
     (void)count_repeated();  // they are left out in any case
     std::int64_t last = repeated_;
     std::int64_t leap = 1;  // over what is found and cannot be read, longer each time: a tree may lead in circles
@@ -277,8 +294,7 @@ class SqliteReader final : public FileReader {
 
   // Counts the messages behind one, and moves it to the last that could be read.
   Result<void> count_from(std::int64_t& last) {
-    auto rows_result =
-        database_.prepare("SELECT topic_id, timestamp, data, id FROM messages NOT INDEXED WHERE id > ? ORDER BY id");
+    auto rows_result = database_.prepare(kRows);
     if (!rows_result) return rows_result.error();
     rows_result->bind(1, last);
     Result<bool> row = true;
@@ -298,7 +314,8 @@ class SqliteReader final : public FileReader {
   // halves, since a look at one message does not read those before it.
   std::optional<std::int64_t> next_readable(std::int64_t last) const {
     const auto look = [&](std::int64_t behind) -> Result<std::optional<std::int64_t>> {
-      auto row_result = database_.prepare("SELECT data, id FROM messages NOT INDEXED WHERE id > ? ORDER BY id LIMIT 1");
+      auto row_result =
+          database_.prepare("SELECT data, rowid FROM messages NOT INDEXED WHERE rowid > ? ORDER BY rowid LIMIT 1");
       if (!row_result) return row_result.error();
       row_result->bind(1, behind);
       auto is_there = row_result->step();
@@ -350,12 +367,13 @@ class SqliteReader final : public FileReader {
       if (wanted_[i]) wanted.push_back(ids_[i]);
     }
     const bool is_filtered = wanted.size() < ids_.size() && !wanted_.empty();
-    auto rows_result = database_.prepare(fmt::format(
-        "SELECT topic_id, timestamp, data FROM messages {} WHERE timestamp >= ? AND id > ? AND id <= ?{} ORDER BY {}",
-        // The index may be what is damaged.
-        options_.recover ? "NOT INDEXED" : "",
-        is_filtered ? fmt::format(" AND topic_id IN ({})", fmt::join(wanted, ",")) : "",
-        options_.recover ? "id" : "timestamp, id"));
+    auto rows_result =
+        database_.prepare(fmt::format("SELECT topic_id, timestamp, data FROM messages {} WHERE timestamp >= ? AND "
+                                      "rowid > ? AND rowid <= ?{} ORDER BY {}",
+                                      // The index may be what is damaged.
+                                      options_.recover ? "NOT INDEXED" : "",
+                                      is_filtered ? fmt::format(" AND topic_id IN ({})", fmt::join(wanted, ",")) : "",
+                                      options_.recover ? "rowid" : "timestamp, rowid"));
     if (!rows_result) return rows_result.error();
     rows_result->bind(1, from_);
     rows_result->bind(2, stretch.first);

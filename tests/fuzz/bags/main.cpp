@@ -129,8 +129,9 @@ class Case {
   Met met() const {
     Met all;
     for (const auto& [name, bytes] : bag_) {
-      if (name == "metadata.yaml") continue;
-      const Met one = name.ends_with(".mcap") ? walk_mcap(bytes) : count_database(folder_ / name);
+      const bool is_mcap = name.ends_with(".mcap");
+      if (!is_mcap && !name.ends_with(".db3")) continue;  // no part of a bag, whatever is in it
+      const Met one = is_mcap ? walk_mcap(bytes) : count_database(folder_ / name);
       all.messages += one.messages;
       all.is_exact = all.is_exact && one.is_exact;
     }

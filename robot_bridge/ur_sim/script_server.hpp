@@ -35,6 +35,8 @@ class ScriptServer {
 
   /// Sends the state, ten times a second; once per cycle of the controller.
   void publish();
+  /// Where it listens.
+  std::uint16_t port() const { return server_->port(); }
   void tell(const Controller::Event& event);
   void drop_clients();
 

@@ -22,7 +22,7 @@ Bytes packet(std::uint8_t type, const Bytes& body) {
 }
 
 // A part of a state packet has the same head, with an unsigned length.
-void add_part(Bytes& body, std::uint8_t kind, Bytes content) {
+void add_part(Bytes& body, std::uint8_t kind, const Bytes& content) {
   const Bytes part = packet(kind, content);
   body.insert(body.end(), part.begin(), part.end());
 }

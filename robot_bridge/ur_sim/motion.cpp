@@ -17,6 +17,8 @@ template <class... Cases>
 struct Match : Cases... {
   using Cases::operator()...;
 };
+template <class... Cases>
+Match(Cases...) -> Match<Cases...>;
 
 constexpr std::size_t kJoints = std::tuple_size_v<Joints>;
 constexpr double kFarthest = 6.2832;      // rad: a joint's range either way

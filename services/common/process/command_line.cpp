@@ -292,7 +292,7 @@ std::string option_entry(const CLI::Option& option) {
   for (const std::string& name : option.get_lnames()) names.push_back(fmt::format("\\fB\\-\\-{}\\fR", plain(name)));
   std::string entry = fmt::format(".TP\n{}", fmt::join(names, ", "));
   if (takes_value(option) && !option.get_positional()) entry += fmt::format(" \\fI{}\\fR", plain(value_name(option)));
-  const std::string meaning = option.get_description();
+  const std::string& meaning = option.get_description();
   entry += "\n" + paragraph(meaning + (meaning.empty() || meaning.ends_with('.') ? "" : "."));
   if (!option.get_default_str().empty()) entry += fmt::format("Default: {}.\n", plain(option.get_default_str()));
   return entry;
@@ -373,17 +373,17 @@ std::vector<std::string> completions(const CLI::App& app, const std::vector<std:
   Words lines;
   if (words.empty()) return lines;
   const Place place = place_after(app, words);
-  if (place.option) {
-    add_values(*place.option, lines);
-  } else if (words.back().starts_with('-')) {
+  const bool dashed = words.back().starts_with('-');
+  const auto commands = commands_of(*place.app);
+  const CLI::Option* valued = place.option;
+  if (!valued && !dashed && commands.empty()) valued = next_positional(*place.app, place.positionals);
+  if (valued) {
+    add_values(*valued, lines);
+  } else if (dashed || commands.empty()) {
     add_options(*place.app, lines);
-  } else if (const auto commands = commands_of(*place.app); !commands.empty()) {
+  } else {
     for (const CLI::App* command : commands)
       lines.push_back(with_meaning(command->get_name(), command->get_description()));
-  } else if (const auto* positional = next_positional(*place.app, place.positionals)) {
-    add_values(*positional, lines);
-  } else {
-    add_options(*place.app, lines);
   }
   return lines;
 }

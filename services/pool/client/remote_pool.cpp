@@ -389,14 +389,14 @@ void RemotePool::absorb(Received received, TimePoint now) {
   }
   const std::shared_ptr<Active> active = found->second;
   const bool refused = !result.error().empty();
+  const WorkerId worker = result.worker();
   auto outcome_result = wire::from_wire(std::move(result));  // its numbers stay readable
   if (refused) {
     const Error& error = outcome_result.error();
     const std::string why = common::shown(error.message, limits::kShownError);
     // A world that did not come, a batch that somebody cancelled: others may do better.
-    if (error.code == Code::kUnknownWorld || error.code == Code::kCancelled)
-      return miss(*active, result.worker(), why, now);
-    return finish(*active, Error{error.code, fmt::format("worker {:016x}: {}", result.worker(), why)});
+    if (error.code == Code::kUnknownWorld || error.code == Code::kCancelled) return miss(*active, worker, why, now);
+    return finish(*active, Error{error.code, fmt::format("worker {:016x}: {}", worker, why)});
   }
   if (!outcome_result || !fits(active->batch, *outcome_result)) {
     return miss(*active, result.worker(),

@@ -15,7 +15,7 @@ std::string six_registers() {
 
 }  // namespace
 
-std::string control_program(double cycle) {
+std::string control_program(double cycle, double watchdog) {
   using namespace contract;
   // A speed that is not renewed within two cycles is ended by speedj's own time, long before the watchdog.
   return fmt::format(
@@ -41,7 +41,7 @@ std::string control_program(double cycle) {
       "  write_output_integer_register({base}, 0)\n"
       "end\n",
       fmt::arg("name", kName), fmt::arg("base", kBase), fmt::arg("second", kBase + 1), fmt::arg("seventh", kBase + 6),
-      fmt::arg("watchdog", kWatchdog), fmt::arg("ready", kReady), fmt::arg("hold", static_cast<int>(kHold)),
+      fmt::arg("watchdog", watchdog), fmt::arg("ready", kReady), fmt::arg("hold", static_cast<int>(kHold)),
       fmt::arg("exit", static_cast<int>(kExit)), fmt::arg("speeds", static_cast<int>(kSpeeds)),
       fmt::arg("positions", static_cast<int>(kPositions)), fmt::arg("six", six_registers()), fmt::arg("cycle", cycle),
       fmt::arg("deceleration", kStopDeceleration));

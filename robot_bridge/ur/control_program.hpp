@@ -35,6 +35,7 @@ inline constexpr double kStopDeceleration = 15.0;  ///< rad/s²
 
 /// Returns the program's text, URScript, ready to be sent to the secondary interface.
 /// `cycle`: the controller's, s: 0.008 or 0.002.
-std::string control_program(double cycle);
+/// `watchdog`: how often the registers must be written, Hz.
+std::string control_program(double cycle, double watchdog = contract::kWatchdog);
 
 }  // namespace jostle::robot_bridge::ur

@@ -17,7 +17,6 @@ using namespace std::chrono_literals;
 
 constexpr auto kConnect = 2s;
 constexpr auto kRetry = 300ms;
-constexpr auto kSilence = 200ms;  // of the controller: it is gone
 constexpr auto kWrite = 20ms;
 constexpr auto kTend = 50ms;
 constexpr auto kUnlockDelay = 5200ms;     // after a protective stop; controllers want 5 s
@@ -86,9 +85,11 @@ void PlanarArm::control(std::stop_token stop) {
 
 void PlanarArm::meet_cycles(RtdeClient& rtde, std::stop_token stop) {
   cycle_ = rtde.cycle();
+  const auto silence =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(3 * options_.watchdog));
   double last = -1.0;
   while (!stop.stop_requested()) {
-    auto state_result = rtde.next(Clock::now() + kSilence);
+    auto state_result = rtde.next(Clock::now() + silence);
     if (!state_result) return leave(state_result.error().message);
     const ArmState& state = *state_result;
     if (state.timestamp < last) return leave("the controller started anew");
@@ -148,7 +149,9 @@ ArmCommand PlanarArm::decide(const ArmState& state, double dt) {
   } else if (moves_ && !report_.is_ready) {
     end_motion(fmt::format("the arm stopped: robot mode {}, safety mode {}, program {}", name_of(state.robot_mode),
                            name_of(state.safety_mode),
-                           state.runtime_state == RuntimeState::kPlaying ? "running" : "not running"));
+                           state.runtime_state == RuntimeState::kPlaying
+                               ? "running"
+                               : fmt::format("not running (its watchdog is {:.0f} ms)", 1e3 * options_.watchdog)));
   } else if (moves_) {
     left_ -= dt;
     if (left_ <= 1e-9) end_motion("");
@@ -232,7 +235,9 @@ Result<void> PlanarArm::get_ready(const ArmState& state) {
   }
   // The registers keep what they were told: nothing runs before they have said for a while that the arm stands still.
   if (held_ < kHeldEnough) return {};
-  if (auto ok = upload(options_.host, options_.script_port, control_program(cycle_), Clock::now() + kConnect); !ok)
+  if (auto ok = upload(options_.host, options_.script_port, control_program(cycle_, 1.0 / options_.watchdog),
+                       Clock::now() + kConnect);
+      !ok)
     return ok;
   std::this_thread::sleep_for(200ms);
   return {};

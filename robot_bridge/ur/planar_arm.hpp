@@ -23,6 +23,9 @@ struct PlanarArmOptions {
   std::string host = "127.0.0.1";
   std::uint16_t rtde_port = rtde::kPort, dashboard_port = kDashboardPort, script_port = primary::kSecondaryPort;
   planar::Mounting mounting;
+  /// s without a word from here that stop the arm, by our program on the controller; three times as long without one
+  /// from there, and the connection counts as lost. On a machine that is not the bridge's alone a little longer.
+  double watchdog = 1.0 / contract::kWatchdog;
   bool powers_up = true;  ///< whether it may switch the arm on, and release its brakes
   bool recovers = true;   ///< whether it may unlock a protective stop, 5 s after it
 };

@@ -98,7 +98,7 @@ class ArmParts : public RunFixture {
   // Until the arm moves towards the target; returns the onlooker's newest sample.
   Onlooker::Sample start_moving() {
     arm = program("jostle_ur_sim", {easy, "--address", address, "--pendant", std::to_string(kPendant)});
-    bridge = program("jostle_bridge", {"ur5", "--host", address, "--silence", silence});
+    bridge = program("jostle_bridge", {"ur5", "--host", address, "--silence", silence, "--watchdog", watchdog});
     coordinator = program("jostle_coordinator", {});
     worker = program("jostle_worker", {"--threads", "2"});
     EXPECT_TRUE(bridge->says("ready on domain", kPatience)) << bridge->err() << arm->err();
@@ -120,7 +120,7 @@ class ArmParts : public RunFixture {
   }
 
   const std::string address = fmt::format("127.0.1.{}", domain + 1);
-  std::string silence = "1";  // s: on a busy machine a commander may be late
+  std::string silence = "1", watchdog = "1";  // s: on a busy machine a commander and a bridge may be late
   std::unique_ptr<ProgramProcess> arm, bridge, coordinator, worker, goal;
   std::unique_ptr<Onlooker> onlooker;
 };
@@ -129,6 +129,7 @@ class ArmParts_Deaths : public ArmParts, public ::testing::WithParamInterface<in
 
 // By the controller's own clock, whatever this machine does meanwhile.
 TEST_P(ArmParts_Deaths, OfTheBridgeStopTheArmWithin200Milliseconds) {
+  watchdog = "0.067";  // as it is unless told otherwise
   start_moving();
   bridge->signal(GetParam());
   const double dead = onlooker->next().time;

@@ -472,8 +472,10 @@ TEST_F(Record, OfAWholeRunIsOneOption) {
 
   EXPECT_EQ(messages_of("/task/goal", bag()).size(), 1u);
   EXPECT_EQ(messages_of("/task/result", bag()).size(), 1u);
-  EXPECT_EQ(messages_of("/robot/command", bag()).size(),
-            json::parse(contents(result))["actions"].get<std::size_t>() + 1);
+  // A command is repeated as long as it is at work.
+  std::set<std::vector<std::byte>> commands;
+  for (const bags::Message& message : messages_of("/robot/command", bag())) commands.insert(message.data);
+  EXPECT_EQ(commands.size(), json::parse(contents(result))["actions"].get<std::size_t>() + 1);
   EXPECT_THAT(topics_of(bag()), Not(Contains(HasSubstr("/pool/"))));
   auto notes = notes_of(bag());
   for (const auto& [topic, lost] : notes["lost"]) EXPECT_EQ(lost, "0") << topic;

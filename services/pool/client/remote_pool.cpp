@@ -229,8 +229,13 @@ Result<std::unique_ptr<physics_pool::AsyncPool::Ticket>> RemotePool::submit(cons
 
 Error RemotePool::no_worker() const {
   const double seconds = std::chrono::duration<double>(options_.no_worker_timeout).count();
-  std::string message = fmt::format("no {} for {:g} s on domain {}; start one with `jostle worker`",
-                                    ever_heard_ ? "usable worker" : "worker heard", seconds, participant_.domain());
+  std::string message =
+      ever_heard_ ? fmt::format(
+                        "no usable worker for {:g} s on domain {}: those that were there are gone, silent or refuse; "
+                        "`jostle workers` lists who is there, and a busy machine may want fewer",
+                        seconds, participant_.domain())
+                  : fmt::format("no worker heard for {:g} s on domain {}; start one with `jostle worker`", seconds,
+                                participant_.domain());
   return {Code::kUnavailable, message + participant_.possible_cause() + last_trouble()};
 }
 

@@ -33,16 +33,19 @@ std::vector<Part> parts_of_world(const RunOptions& options, const std::filesyste
     arguments.insert(arguments.end(), of_run.begin(), of_run.end());
     return Part{std::move(title), std::move(program), std::move(arguments)};
   };
-  // A simulated arm may wait longer for a commander on a machine whose workers take all cores.
-  const auto bridge = [&](const std::string& host, const char* silence) {
-    return part("the bridge", "bridge", {"ur5", "--host", host, "--silence", silence});
+  const auto bridge = [&](const std::string& host, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"ur5", "--host", host};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return part("the bridge", "bridge", arguments);
   };
   switch (options.arm.kind) {
     case Arm::Kind::kUr:
-      return {bridge(options.arm.host, "0.07")};
+      return {bridge(options.arm.host, {})};
     case Arm::Kind::kUrSim: {
       const std::string address = controller_address(domain);
-      return {part("the simulated arm", "ur_sim", {scene.string(), "--address", address}), bridge(address, "1")};
+      return {part("the simulated arm", "ur_sim", {scene.string(), "--address", address}),
+              // It can do no harm, and this machine may be busy.
+              bridge(address, {"--silence", "1", "--watchdog", "1"})};
     }
     case Arm::Kind::kSim:
       break;

@@ -35,6 +35,9 @@ int main(int argc, char** argv) {
   ur5->add_option("--height", arm_options.mounting.height, "Of the hand's middle above the surface, m")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1.0));
+  ur5->add_option("--watchdog", arm_options.watchdog, "Seconds without a word from the bridge that stop the arm")
+      ->capture_default_str()
+      ->check(CLI::Range(0.02, 10.0));
   ur5->add_flag("!--no-power-up", arm_options.powers_up, "Leave it to people to switch the arm on");
   ur5->add_flag("!--no-recovery", arm_options.recovers, "Leave it to people to unlock a protective stop");
   ur5->add_option("--patience", patience, "Seconds that the arm may take to get ready")

@@ -192,7 +192,7 @@ TEST_P(BagCli, ExportsTables) {
   EXPECT_EQ(run({"export", path, "--csv", "--topic", "/robot/p*", "--from", "1", "--to", "2"}), 0) << program->err();
   EXPECT_THAT(program->out(), StartsWith("time_s,log_time_ns,publish_time_ns,x,y,z\r\n1.000000000,"));
   EXPECT_EQ(std::ranges::count(program->out(), '\n'), 4);
-  EXPECT_EQ(run({"export", path, "--csv"}), 1);
+  EXPECT_EQ(run({"export", path, "--csv"}), 2);
   EXPECT_THAT(program->err(), HasSubstr("got 2 topics, wanted one"));
 }
 
@@ -248,7 +248,7 @@ TEST_P(BagCli, ExportRefusesTimesThatAreNoneAndFoldersThatHoldSomethingElse) {
   expect_refused({"--from", "5", "--to", "4"}, 2, "--to: got 4 s, wanted at least the 5 s of --from");
   expect_refused({"--from", "11"}, 2, "--from: got 11 s, wanted at most 10 s, where the last message is");
   expect_refused({"--to", "nan"}, 2, "--to: got 'nan', wanted a finite number");
-  EXPECT_EQ(run({"export", path, "--csv", "-o", path}), 1);
+  EXPECT_EQ(run({"export", path, "--csv", "-o", path}), 2);
   EXPECT_THAT(program->err(), HasSubstr("wanted a new or an empty folder"));
   EXPECT_FALSE(fs::exists(path + "/robot_text.csv"));
   EXPECT_EQ(run({"export", path, "--json", "--topic", "/robot/text", "-o", "/dev/null"}), 0) << program->err();

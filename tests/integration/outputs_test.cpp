@@ -60,6 +60,17 @@ TEST_F(Outputs, StandardOutputThatNobodyReadsIsAnError) {
   EXPECT_THAT(closed.err, HasSubstr("standard output: cannot be written: Broken pipe"));
 }
 
+TEST_F(Outputs, ThatAreReadTooAreRefused) {
+  ASSERT_EQ(shell("jostle_scene generate -o a.yaml && ln a.yaml b.json").code, 0);
+  const std::string before = contents(folder.path() / "a.yaml");
+  for (const char* command : {"jostle_run a.yaml --json a.yaml", "jostle_run a.yaml --json b.json"}) {
+    const Ended ended = shell(command);
+    EXPECT_EQ(ended.code, 2) << command;
+    EXPECT_THAT(ended.err, HasSubstr("which is read, too")) << command;
+  }
+  EXPECT_EQ(contents(folder.path() / "a.yaml"), before);
+}
+
 TEST_F(Outputs, StandardErrorThatIsFullOrClosedEndsNothing) {
   EXPECT_EQ(shell("jostle_scene check none.yaml 2>/dev/full").code, 2);
   EXPECT_EQ(shell("jostle_scene check none.yaml 2>&-").code, 2);

@@ -264,17 +264,23 @@ TEST_F(SimulatedWorldProcess, DropsCommandsOfAnOlderEpochAndOnesAlreadyDone) {
   ASSERT_TRUE(first) << sim->err();
   EXPECT_GT(first->q()[0], -0.33 + 5e-3);
 
+  EXPECT_TRUE(commands.write(command(5, 1)));  // repeated by a sender that has not heard yet that it is done
+  EXPECT_TRUE(commands.write(command(5, 2)));
+  const auto second = finished(5, 2);
+  ASSERT_TRUE(second) << sim->err();
+  EXPECT_LT(second->q()[0] - first->q()[0], 1.5 * (first->q()[0] + 0.33));  // once, not twice
+
   EXPECT_TRUE(commands.write(command(5, 1)));
   ASSERT_TRUE(sim->says("command 5/1 is stale, dropped", kPatience)) << sim->err();
   const auto after = status_that([](const RobotStatus& status) { return !status.busy(); });
   ASSERT_TRUE(after);
   EXPECT_EQ(after->epoch(), 5u);
-  EXPECT_EQ(after->q(), first->q());
+  EXPECT_EQ(after->q(), second->q());
 
   EXPECT_TRUE(commands.write(command(4, 1)));  // a new task counts anew; epochs have no order
   EXPECT_TRUE(finished(4, 1)) << sim->err();
-  EXPECT_TRUE(commands.write(command(5, 2)));  // what is over stays over
-  ASSERT_TRUE(sim->says("command 5/2 is stale, dropped", kPatience)) << sim->err();
+  EXPECT_TRUE(commands.write(command(5, 3)));  // what is over stays over
+  ASSERT_TRUE(sim->says("command 5/3 is stale, dropped", kPatience)) << sim->err();
 }
 
 // Clocks may differ, or go back: what counts is who is there.

@@ -288,14 +288,17 @@ Result<void> check_folder(const std::string& folder) {
                fmt::format("--output: got {}, which is there, wanted a new or an empty folder", folder)};
 }
 
-Result<void> export_csv(BagReader& reader, const Decoders& decoders, const Selection& selection,
-                        const std::string& folder, Findings& undecoded, std::stop_token stop) {
+Result<void> check_tables(const Selection& selection, const std::string& folder) {
   if (folder == "-" && selection.topics.size() > 1) {
     return Error{Code::kInvalidArgument,
                  fmt::format("--csv to standard output: got {} topics, wanted one; remedy: --topic, or --output FOLDER",
                              selection.topics.size())};
   }
-  if (auto ok = check_folder(folder); !ok) return ok;
+  return check_folder(folder);
+}
+
+Result<void> export_csv(BagReader& reader, const Decoders& decoders, const Selection& selection,
+                        const std::string& folder, Findings& undecoded, std::stop_token stop) {
   std::map<int, Columns> columns;
   auto ok = for_each(reader, decoders, selection, "looking for columns", undecoded, stop,
                      [&](const Message& message, const Json& json) { columns[message.topic].add(json); });
@@ -339,6 +342,9 @@ int export_bag(const ExportArguments& arguments, std::stop_token stop) {
   const Decoders decoders((*reader_result)->info());
   const auto selection_result = select(arguments, (*reader_result)->info(), decoders);
   if (!selection_result) return fail(selection_result.error(), common::kExitFailed);
+  if (arguments.as_csv) {
+    if (auto ok = check_tables(*selection_result, arguments.output); !ok) return fail(ok.error(), common::kExitUsage);
+  }
   Findings undecoded;
   const auto ok = (arguments.as_csv ? export_csv : export_json)(**reader_result, decoders, *selection_result,
                                                                 arguments.output, undecoded, stop);

@@ -1,6 +1,9 @@
 #include "services/task/run/options.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <utility>
 
 #include "physics_pool/uncertainty/belief.hpp"
 #include "services/common/process/command_line.hpp"
@@ -9,6 +12,22 @@
 #include "services/task/config/predictor.hpp"
 
 namespace jostle::task {
+namespace {
+
+// An output that is an input, too, by whatever name, would be gone.
+Result<void> keep_inputs(const GoalArguments& arguments, const RunOptions& options) {
+  for (const auto& [option, output] : {std::pair("--json", options.json), std::pair("--picture", options.picture)}) {
+    for (const std::filesystem::path& input : {std::filesystem::path(arguments.scene), arguments.parameters.file}) {
+      std::error_code missing;
+      if (output.empty() || input.empty() || !std::filesystem::equivalent(output, input, missing)) continue;
+      return Error{Code::kInvalidArgument,
+                   fmt::format("{}: got {}, which is read, too; wanted another file", option, output.string())};
+    }
+  }
+  return {};
+}
+
+}  // namespace
 
 void add_goal_options(CLI::App& app, GoalArguments& arguments, RunOptions& options) {
   app.add_option("scene", arguments.scene, "Scene file; `jostle scene generate` makes one")->required();
@@ -55,6 +74,7 @@ Result<void> complete(const GoalArguments& arguments, RunOptions& options) {
       !ok) {
     return ok;
   }
+  if (auto ok = keep_inputs(arguments, options); !ok) return ok;
   auto level_result = physics_pool::parse_uncertainty(arguments.level);
   if (!level_result) return level_result.error();
   options.level = *level_result;

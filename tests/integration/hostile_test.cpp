@@ -280,12 +280,12 @@ TEST_F(Hostile, CommandsOfOthersAreSaidOnceASecond) {
   ASSERT_TRUE(writer.wait_for_readers(deadline())) << sim->err();
   VelocityCommand command;
   command.epoch(1);
-  command.sequence_number(2);
   command.velocities({0, 0, 0, 0});
   command.duration(0.01);
-  ASSERT_TRUE(writer.write(command));
-  command.sequence_number(1);  // older ones: the newest may be repeated
-  for (int i = 0; i < 20'000; ++i) ASSERT_TRUE(writer.write(command));
+  for (std::uint64_t i = 0; i < 20'000; ++i) {
+    command.sequence_number(1 + i % 2);  // an older one again and again; the newest may be repeated
+    ASSERT_TRUE(writer.write(command));
+  }
   command.epoch(UINT64_MAX);
   command.velocities({kNaN, 0, 0, 0});
   for (int i = 0; i < 20'000; ++i) ASSERT_TRUE(writer.write(command));

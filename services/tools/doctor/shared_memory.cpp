@@ -84,7 +84,9 @@ bool is_locked(const fs::path& file) {
 bool is_judged(const fs::path& file, std::chrono::seconds settled) {
   struct stat status {};
   if (stat(file.c_str(), &status) != 0) return false;
-  return (geteuid() == 0 || status.st_uid == geteuid()) && std::time(nullptr) - status.st_ctime >= settled.count();
+  // Not time(): it lags behind the clock of files by up to a tick, and a file would come from the future.
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  return (geteuid() == 0 || status.st_uid == geteuid()) && now - status.st_ctime >= settled.count();
 }
 
 bool is_abandoned(const Leftover& candidate, const std::set<std::string>& used, std::chrono::seconds settled) {

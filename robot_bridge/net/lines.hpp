@@ -2,7 +2,6 @@
 /// \file
 /// A TCP stream cut into lines.
 
-#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -19,6 +18,9 @@ class Lines {
     waiting_.append(bytes.begin(), bytes.end());
     if (waiting_.size() > kLongest && waiting_.find('\n') == std::string::npos) waiting_.clear();
   }
+
+  /// Returns how many bytes wait for their end, or to be taken.
+  std::size_t waiting() const { return waiting_.size(); }
 
   /// Returns the next line without its end, "\n" or "\r\n"; nothing while its end is missing.
   std::optional<std::string> next() {

@@ -11,6 +11,8 @@
 #include <optional>
 #include <utility>
 
+#include "robot_bridge/net/lines.hpp"
+
 namespace jostle::robot_bridge::net {
 namespace {
 
@@ -26,7 +28,7 @@ struct TcpClient::Impl {
   asio::io_context context{1};
   tcp::socket socket{context};
   std::string place;
-  std::string line;  // begun, its end is still to come
+  Lines lines;  // of read_line()
 
   // Runs one operation that `begin` started with a handler to be called, until it is done or its time is over.
   template <class Begin>
@@ -90,28 +92,17 @@ Result<std::span<const std::uint8_t>> TcpClient::read(std::span<std::uint8_t> ro
 Result<std::string> TcpClient::read_line(Clock::time_point deadline) {
   std::array<std::uint8_t, 1024> room;
   for (;;) {
-    if (const auto end = impl_->line.find('\n'); end != std::string::npos) {
-      std::string line = impl_->line.substr(0, end);
-      impl_->line.erase(0, end + 1);
-      if (line.ends_with('\r')) line.pop_back();
-      return line;
-    }
-    if (impl_->line.size() > kLongestLine) {
+    if (auto line = impl_->lines.next()) return *std::move(line);
+    if (impl_->lines.waiting() > kLongestLine) {
       return Error{Code::kInvalidArgument,
                    fmt::format("{}: got a line of more than {} bytes, wanted its end", impl_->place, kLongestLine)};
     }
     auto bytes_result = read(room, deadline);
     if (!bytes_result) return bytes_result.error();
-    impl_->line.append(bytes_result->begin(), bytes_result->end());
+    impl_->lines.append(*bytes_result);
   }
 }
 
 const std::string& TcpClient::place() const { return impl_->place; }
-
-std::string TcpClient::own_address() const {
-  error_code code;
-  const auto end = impl_->socket.local_endpoint(code);
-  return code ? "" : end.address().to_string();
-}
 
 }  // namespace jostle::robot_bridge::net

@@ -40,8 +40,6 @@ class TcpClient {
 
   /// Returns "host:port".
   const std::string& place() const;
-  /// Returns this end's own address, as the other side sees it where nobody translates addresses.
-  std::string own_address() const;
 
  private:
   struct Impl;

@@ -7,23 +7,15 @@
 #include <boost/asio/write.hpp>
 #include <utility>
 
+#include "robot_bridge/net/lines.hpp"
+
 namespace jostle::robot_bridge::net {
 
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-namespace {
-
-std::string address_of(const tcp::socket& socket) {
-  error_code code;
-  const auto end = socket.remote_endpoint(code);
-  return code ? "gone" : end.address().to_string();
-}
-
-}  // namespace
-
-Peer::Peer(tcp::socket socket) : socket_(std::move(socket)), address_(address_of(socket_)) {
+Peer::Peer(tcp::socket socket) : socket_(std::move(socket)) {
   error_code ignored;
   socket_.set_option(tcp::no_delay(true), ignored);
 }
@@ -131,5 +123,23 @@ void TcpServer::accept() {
 }
 
 std::uint16_t TcpServer::port() const { return acceptor_.local_endpoint().port(); }
+
+Result<std::unique_ptr<TcpServer>> serve_lines(asio::io_context& context, const std::string& address,
+                                               std::uint16_t port, LineService service) {
+  return TcpServer::listen(context, address, port, [service = std::move(service)](const std::shared_ptr<Peer>& peer) {
+    if (!service.greeting.empty()) peer->send(service.greeting);
+    const auto lines = std::make_shared<Lines>();
+    const auto take = [&service, lines, client = peer.get()](std::span<const std::uint8_t> bytes) {
+      lines->append(bytes);
+      while (const auto line = lines->next()) {
+        if (!client->is_open()) return;
+        const LineService::Answer answer = service.answer(*line);
+        client->send(answer.text);
+        if (answer.hangs_up) return client->close_when_sent();
+      }
+    };
+    peer->start({.on_bytes = take, .on_end = {}});
+  });
+}
 
 }  // namespace jostle::robot_bridge::net

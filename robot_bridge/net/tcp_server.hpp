@@ -48,8 +48,6 @@ class Peer : public std::enable_shared_from_this<Peer> {
   bool is_open() const { return socket_.is_open(); }
   /// Returns how many bytes wait to be sent: none as long as the other side keeps up.
   std::size_t unsent() const { return sending_.size() + waiting_.size(); }
-  /// Returns "127.0.0.1".
-  const std::string& address() const { return address_; }
 
  private:
   void read();
@@ -57,7 +55,6 @@ class Peer : public std::enable_shared_from_this<Peer> {
   void end();
 
   boost::asio::ip::tcp::socket socket_;
-  const std::string address_;
   Listener listener_;
   std::array<std::uint8_t, 4096> room_;
   Bytes sending_, waiting_;
@@ -86,5 +83,20 @@ class TcpServer {
   OnPeer on_peer_;
   std::vector<std::weak_ptr<Peer>> peers_;
 };
+
+/// What a server of a protocol in lines says, line ends included.
+struct LineService {
+  struct Answer {
+    std::string text;
+    bool hangs_up = false;  ///< once it was sent
+  };
+  std::string greeting;  ///< to everybody who comes
+  std::function<Answer(const std::string& line)> answer;
+};
+
+/// Serves a protocol in which each line of a client has one answer.
+/// Error kUnavailable naming the place and the reason.
+Result<std::unique_ptr<TcpServer>> serve_lines(boost::asio::io_context& context, const std::string& address,
+                                               std::uint16_t port, LineService service);
 
 }  // namespace jostle::robot_bridge::net

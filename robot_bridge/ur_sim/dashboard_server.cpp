@@ -7,8 +7,6 @@
 #include <functional>
 #include <vector>
 
-#include "robot_bridge/net/lines.hpp"
-
 namespace jostle::robot_bridge::ur_sim {
 namespace {
 
@@ -136,23 +134,11 @@ std::string answer_dashboard(Controller& controller, std::string_view command) {
 
 Result<std::unique_ptr<net::TcpServer>> serve_dashboard(boost::asio::io_context& context, Controller& controller,
                                                         const std::string& address, std::uint16_t port) {
-  return net::TcpServer::listen(context, address, port, [&controller](const std::shared_ptr<net::Peer>& peer) {
-    const auto lines = std::make_shared<net::Lines>();
-    peer->send(kBanner);
-    peer->start({.on_bytes =
-                     [&controller, lines, client = peer.get()](std::span<const std::uint8_t> bytes) {
-                       lines->append(bytes);
-                       while (const auto line = lines->next()) {
-                         if (!client->is_open()) return;
-                         if (lower(*line) == "quit") {
-                           client->send("Disconnected\n");
-                           return client->close_when_sent();
-                         }
-                         client->send(answer_dashboard(controller, *line) + "\n");
-                       }
-                     },
-                 .on_end = {}});
-  });
+  const auto answer = [&controller](const std::string& line) -> net::LineService::Answer {
+    if (lower(line) == "quit") return {.text = "Disconnected\n", .hangs_up = true};
+    return {.text = answer_dashboard(controller, line) + "\n"};
+  };
+  return net::serve_lines(context, address, port, {.greeting = kBanner, .answer = answer});
 }
 
 }  // namespace jostle::robot_bridge::ur_sim

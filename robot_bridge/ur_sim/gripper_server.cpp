@@ -8,7 +8,6 @@
 #include <sstream>
 
 #include "idl/types/number.hpp"
-#include "robot_bridge/net/lines.hpp"
 
 namespace jostle::robot_bridge::ur_sim {
 namespace {
@@ -104,15 +103,10 @@ std::string Gripper::answer(std::string_view request) {
 
 Result<std::unique_ptr<net::TcpServer>> serve_gripper(boost::asio::io_context& context, Gripper& gripper,
                                                       const std::string& address, std::uint16_t port) {
-  return net::TcpServer::listen(context, address, port, [&gripper](const std::shared_ptr<net::Peer>& peer) {
-    const auto lines = std::make_shared<net::Lines>();
-    peer->start({.on_bytes =
-                     [&gripper, lines, client = peer.get()](std::span<const std::uint8_t> bytes) {
-                       lines->append(bytes);
-                       while (const auto line = lines->next()) client->send(gripper.answer(*line));
-                     },
-                 .on_end = {}});
-  });
+  const auto answer = [&gripper](const std::string& line) -> net::LineService::Answer {
+    return {.text = gripper.answer(line)};
+  };
+  return net::serve_lines(context, address, port, {.greeting = "", .answer = answer});
 }
 
 }  // namespace jostle::robot_bridge::ur_sim

@@ -4,8 +4,6 @@
 
 #include <map>
 
-#include "robot_bridge/net/lines.hpp"
-
 namespace jostle::robot_bridge::ur_sim {
 
 std::string press(Controller& controller, std::string_view button) {
@@ -28,15 +26,10 @@ std::string press(Controller& controller, std::string_view button) {
 
 Result<std::unique_ptr<net::TcpServer>> serve_pendant(boost::asio::io_context& context, Controller& controller,
                                                       const std::string& address, std::uint16_t port) {
-  return net::TcpServer::listen(context, address, port, [&controller](const std::shared_ptr<net::Peer>& peer) {
-    const auto lines = std::make_shared<net::Lines>();
-    peer->start({.on_bytes =
-                     [&controller, lines, client = peer.get()](std::span<const std::uint8_t> bytes) {
-                       lines->append(bytes);
-                       while (const auto line = lines->next()) client->send(press(controller, *line) + "\n");
-                     },
-                 .on_end = {}});
-  });
+  const auto answer = [&controller](const std::string& line) -> net::LineService::Answer {
+    return {.text = press(controller, line) + "\n"};
+  };
+  return net::serve_lines(context, address, port, {.greeting = "", .answer = answer});
 }
 
 }  // namespace jostle::robot_bridge::ur_sim

@@ -17,7 +17,8 @@ std::string six_registers() {
 
 std::string control_program(double cycle, double watchdog) {
   using namespace contract;
-  // A speed that is not renewed within two cycles is ended by speedj's own time, long before the watchdog.
+  // The registers keep what they were told, and the loop obeys it again: only the watchdog ends a speed that nobody
+  // renews.
   return fmt::format(
       "def {name}():\n"
       "  rtde_set_watchdog(\"input_int_register_{base}\", {watchdog}, \"stop\")\n"

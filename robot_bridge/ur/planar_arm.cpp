@@ -186,13 +186,13 @@ void PlanarArm::tend(std::stop_token stop) {
     if (report.is_connected && report.is_ready) {
       if (!trouble().empty() && !report.failed) say("");
     } else if (report.is_connected) {
-      if (auto ok = get_ready(report.state); !ok) say(ok.error().message);
+      if (auto ok = get_ready(report.state, stop); !ok) say(ok.error().message);
     }
     pause(kTend, stop);
   }
 }
 
-Result<void> PlanarArm::get_ready(const ArmState& state) {
+Result<void> PlanarArm::get_ready(const ArmState& state, const std::stop_token& stop) {
   const auto ask = [&](const std::string& command) -> Result<std::string> {
     auto dashboard_result = Dashboard::connect(options_.host, options_.dashboard_port, Clock::now() + kConnect);
     if (!dashboard_result) return dashboard_result.error();
@@ -202,7 +202,8 @@ Result<void> PlanarArm::get_ready(const ArmState& state) {
   if (state.safety_mode == SafetyMode::kProtectiveStop) {
     if (!options_.recovers) return refusal("protective stop: look at the arm, and unlock it on the teach pendant");
     say("protective stop: it is unlocked 5 s after it");
-    std::this_thread::sleep_for(kUnlockDelay);
+    pause(kUnlockDelay, stop);
+    if (stop.stop_requested()) return {};
     if (auto closed = ask("close safety popup"); !closed) return closed.error();
     auto reply_result = ask("unlock protective stop");
     if (!reply_result) return reply_result.error();

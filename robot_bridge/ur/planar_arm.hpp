@@ -88,7 +88,7 @@ class PlanarArm {
   void leave(const std::string& why);
   // The other thread's.
   void tend(std::stop_token stop);
-  Result<void> get_ready(const ArmState& state);
+  Result<void> get_ready(const ArmState& state, const std::stop_token& stop);
 
   void say(const std::string& trouble);
 

@@ -190,7 +190,9 @@ TEST_P(ArmParts_Stops, EndTheRunAndTheNextOneGrasps) {
   const std::string button = GetParam();
   const double moving = start_moving().time;
   press(button);
-  if (button != "reboot") EXPECT_LT(time_to_stand(moving), 1.0);
+  if (button != "reboot") {
+    EXPECT_LT(time_to_stand(moving), 1.0);
+  }
   EXPECT_EQ(goal->wait(kPatience), 3) << goal->err();
   EXPECT_THAT(goal->err(), HasSubstr("robot: "));
   if (button == "emergency stop") press("restart safety");

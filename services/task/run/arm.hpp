@@ -43,13 +43,13 @@ std::vector<Part> parts_of_world(const RunOptions& options, const std::filesyste
 /// Returns how long it may take until it is heard.
 std::chrono::seconds patience(const Arm& arm);
 
-/// Returns the scene as it is to be drawn, and turns the robot's part of states [nq] of the planner's scene into that
-/// scene's.
-/// Error kInvalidArgument: a state that the arm cannot have.
+/// What is to be drawn of a run.
 struct Drawn {
   physics_pool::Scene scene;
-  std::vector<std::vector<double>> states;
+  std::vector<std::vector<double>> states;  ///< [nq] of that scene
 };
+/// Returns the scene with the robot that moves, and turns states [nq] of the planner's scene into that scene's.
+/// Error kInvalidArgument: a state that the arm cannot have.
 Result<Drawn> drawn(const Arm& arm, const physics_pool::Scene& scene, const std::vector<std::vector<double>>& states);
 
 }  // namespace jostle::task

@@ -5,11 +5,9 @@
 
 #include <CLI/CLI.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/post.hpp>
 #include <chrono>
 #include <thread>
 
-#include "physics_pool/uncertainty/belief.hpp"
 #include "robot_bridge/ur/dashboard.hpp"
 #include "robot_bridge/ur/primary.hpp"
 #include "robot_bridge/ur_sim/dashboard_server.hpp"
@@ -39,9 +37,8 @@ constexpr auto kEyes = std::chrono::milliseconds(10);  // between two measuremen
 // What cameras would see of the objects, stamped with the time of day.
 class Eyes {
  public:
-  Eyes(const wire::Participant& participant, const physics_pool::Scene& scene)
-      : scene_(scene),
-        objects_(participant, wire::topics::kObjectStates),
+  explicit Eyes(const wire::Participant& participant)
+      : objects_(participant, wire::topics::kObjectStates),
         poses_(participant, wire::topics::kObjectPoses),
         transforms_(participant, wire::topics::kTransforms) {}
 
@@ -59,7 +56,6 @@ class Eyes {
   }
 
  private:
-  const physics_pool::Scene& scene_;
   Clock::time_point next_{};
   long looks_ = 0;
   wire::Writer<jostle_msgs::msg::ObjectStates> objects_;
@@ -210,7 +206,7 @@ int main(int argc, char** argv) {
           {.name = "jostle_ur_sim", .domain = process.domain, .role = wire::Role::kRobot, .waits_for_server = true});
       if (!participant_result) return fail(participant_result.error());
       participant.emplace(*participant_result);
-      eyes = std::make_unique<Eyes>(*participant, *scene_result);
+      eyes = std::make_unique<Eyes>(*participant);
     }
     spdlog::info("{} ready at {}: scene '{}'", kind.model, options.address, scene_result->name);
     if (auto ok = machine.run(eyes.get(), signal.token()); !ok) return fail(ok.error());

@@ -61,8 +61,8 @@ class RunFixture : public ::testing::Test {
 
   /// A run whose world takes its time, one action done. Six actions take
   /// 6 s / `rate`.
-  void start_acting(int rate = 1) {
-    start({easy, "--workers", "2", "--rate", std::to_string(rate), "--parameters", plain});
+  void start_acting(double rate = 1.0) {
+    start({easy, "--workers", "2", "--rate", fmt::format("{}", rate), "--parameters", plain});
     ASSERT_TRUE(soon(kPatience, [&] { return executed(1) || run->code(); })) << run->err();
     ASSERT_FALSE(run->code()) << run->err();
   }

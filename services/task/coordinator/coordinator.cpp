@@ -25,6 +25,7 @@ using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kFeedbackPeriod{100};
 constexpr std::size_t kGoalQueue = 8;
+constexpr std::chrono::seconds kLastWords{1};       // for readers to receive what was written
 constexpr std::chrono::seconds kAnswerPatience{2};  // for the middleware to take a result
 constexpr std::chrono::milliseconds kAnswerPause{50};
 
@@ -199,6 +200,11 @@ void Coordinator::run(std::stop_token stop) {
     auto goal = goals_.take(steady_clock::now() + std::chrono::seconds(1), stop);
     if (goal && !stop.stop_requested()) serve(*goal, stop);
   }
+  // What a reader has not yet received would be lost with this process: a recorder's bag would have no end.
+  const auto deadline = steady_clock::now() + kLastWords;
+  observation_writer_.wait_until_received(deadline);
+  plan_writer_.wait_until_received(deadline);
+  result_writer_.wait_until_received(deadline);
 }
 
 void Coordinator::serve(const Goal& goal, std::stop_token stop) {

@@ -117,13 +117,18 @@ Result<void> Execution::move(std::span<const double> u, Phase phase) {
 
 Result<Outcome> Execution::end(const Result<void>& ended) {
   outcome_.total_time = Clock::now() - start_;
-  if (!ended) {
-    if (ended.error().code != Code::kDeadline) return ended.error();
+  const Code code = ended ? Code::kInternal : ended.error().code;
+  if (!ended && code == Code::kDeadline) {
     outcome_.conclude(Ending::kTimedOut, is_out_of_rollouts_
                                              ? fmt::format("all {} rollouts are spent", setup_.limits.rollouts)
                                              : fmt::format("timeout after {:.0f} s", outcome_.total_time.count()));
+  } else if (!ended && code == Code::kCancelled) {
+    outcome_.conclude(Ending::kCancelled, "cancelled");
+  } else if (!ended) {
+    outcome_.conclude(Ending::kBroken, ended.error().message);
   }
   notify(Phase::kDone);
+  if (!ended && code != Code::kDeadline) return ended.error();
   return std::move(outcome_);
 }
 
@@ -134,11 +139,7 @@ std::uint64_t Execution::rollouts_left() const {
 
 void Execution::notify(Phase phase) const {
   if (!on_event_) return;
-  on_event_({.phase = phase,
-             .actions = outcome_.actions,
-             .replans = outcome_.replans,
-             .plan = planned_ ? &plan_ : nullptr,
-             .observed = &x_});
+  on_event_({.phase = phase, .outcome = outcome_, .plan = planned_ ? &plan_ : nullptr, .observed = &x_});
 }
 
 Result<State> assemble_state(const StateLayout& layout, const robot_bridge::RobotReading& robot,

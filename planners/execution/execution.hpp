@@ -44,16 +44,6 @@ struct ControlSetup {
 /// Phases of a run, for those who watch.
 enum class Phase { kPlanning, kActing, kClosing, kDone };
 
-/// A running controller's news; valid during the call.
-struct ControlEvent {
-  Phase phase = Phase::kPlanning;
-  int actions = 0;
-  int replans = 0;
-  const Plan* plan = nullptr;       ///< the present plan, once there is one
-  const State* observed = nullptr;  ///< newest observation
-};
-using OnEvent = std::function<void(const ControlEvent&)>;
-
 /// How a run ended; the numbers are those of jostle_msgs/msg/GoalResult. A controller gives the first
 /// four, and whoever started the controller gives the others.
 enum class Ending : std::uint8_t {
@@ -91,6 +81,15 @@ struct Outcome {
   bool is_over() const { return ending != Ending::kUnknown; }
 };
 
+/// A running controller's news; valid during the call.
+struct ControlEvent {
+  Phase phase = Phase::kPlanning;
+  const Outcome& outcome;           ///< what has come of the run so far; with kDone: of all of it, however it ended
+  const Plan* plan = nullptr;       ///< the present plan, once there is one
+  const State* observed = nullptr;  ///< newest observation
+};
+using OnEvent = std::function<void(const ControlEvent&)>;
+
 /// One run of a controller under way: the newest state, the present plan, and what
 /// has come of the run so far.
 ///
@@ -126,7 +125,8 @@ class Execution {
   /// Applies u, which belongs to no plan, and observes.
   Result<void> move(std::span<const double> u, Phase phase);
 
-  /// Ends the run. A task that ran out of time is an Outcome, because the system has not failed.
+  /// Ends the run, and tells the watcher. A task that ran out of time is an Outcome, because the system has not
+  /// failed; what a run that was stopped or broke has come to is in the last event.
   Result<Outcome> end(const Result<void>& ended);
 
   void notify(Phase phase) const;

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <nlohmann/json.hpp>
+
 #include "services/wire/dds/topics.hpp"
 #include "services/wire/dds/writer.hpp"
 #include "tests/support/run_fixture.hpp"
@@ -139,6 +141,50 @@ TEST_F(Deaths, InterruptedRunCleansUpWhilePlanning) {
   EXPECT_LT(took, kReport);
   EXPECT_THAT(run->left_over(), IsEmpty());
   EXPECT_THAT(run_folders(), IsEmpty());
+}
+
+// What a run has come to is worth having, however it ends.
+class UnfinishedRun : public Deaths {
+ protected:
+  void expect_numbers(const std::string& ending) {
+    const auto report = nlohmann::json::parse(contents(json), nullptr, false);
+    ASSERT_FALSE(report.is_discarded()) << run->err();
+    EXPECT_EQ(report["ending"], ending);
+    EXPECT_FALSE(report["success"]);
+    EXPECT_GE(report["actions"], 1);
+    EXPECT_EQ(report["observed_states"].size(), report["observed_times"].size());
+    EXPECT_TRUE(report["plan_hash"].is_string());
+    EXPECT_THAT(contents(picture).substr(1, 3), "PNG");
+    EXPECT_THAT(contents(bag / "metadata.yaml"), HasSubstr("message_count"));
+  }
+
+  std::vector<std::string> outputs() const {
+    return {"--json", json,           "--picture", picture, "--record",  bag, "--rate",
+            "0.5",    "--parameters", plain,       easy,    "--workers", "1"};
+  }
+
+  const std::filesystem::path json = folder.path() / "run.json", picture = folder.path() / "run.png",
+                              bag = folder.path() / "bag";
+};
+
+TEST_F(UnfinishedRun, LeavesItsNumbersWhenItIsInterrupted) {
+  start(outputs());
+  ASSERT_TRUE(soon(kPatience, [&] { return executed(1) || run->code(); })) << run->err();
+
+  EXPECT_EQ(code_after(run->pid(), SIGINT, 20s), 130) << run->err();
+
+  expect_numbers("cancelled");
+  EXPECT_THAT(run->out(), HasSubstr("CANCELLED"));
+}
+
+TEST_F(UnfinishedRun, LeavesItsNumbersWhenItsWorldDies) {
+  start(outputs());
+  ASSERT_TRUE(soon(kPatience, [&] { return executed(1) || run->code(); })) << run->err();
+
+  EXPECT_EQ(code_after(run->child(kSim), SIGKILL, 20s), 3) << run->err();
+
+  expect_numbers("broken");
+  EXPECT_THAT(run->out(), HasSubstr("BROKEN"));
 }
 
 TEST_F(Deaths, InterruptedRunCleansUpWhileActing) {

@@ -152,7 +152,7 @@ std::string report_of(const planners::Outcome& outcome, const Task& task, std::u
                         {"iterations", plan.iterations},
                         {"replans", outcome.replans},
                         {"actions", outcome.actions},
-                        {"plan_seconds", outcome.plan_time.count()},
+                        {"plan_seconds", has_plan ? nlohmann::json(outcome.plan_time.count()) : nullptr},
                         {"planning_seconds", outcome.planning_time.count()},
                         {"total_seconds", outcome.total_time.count()},
                         {"rollouts", outcome.rollouts},
@@ -239,17 +239,17 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
     auto ok = check_sizes(goal);
     auto task_result = ok ? Task::prepare(goal, pool_, [](const std::string& why) { spdlog::info("split: {}", why); })
                           : Result<Task>(ok.error());
-    std::vector<jostle_msgs::msg::Observation> seen;
-    auto outcome_result =
-        task_result ? perform(goal, *task_result, seen, cancelled) : Result<planners::Outcome>(task_result.error());
-    if (outcome_result) {
-      result.ending(on_the_wire(outcome_result->ending));
-      result.success(outcome_result->success);
-      result.reason(outcome_result->reason);
+    const Performance done = task_result ? perform(goal, *task_result, cancelled)
+                                         : Performance{.outcome = {}, .seen = {}, .ended = task_result.error()};
+    if (done.outcome) {
+      result.ending(on_the_wire(done.outcome->ending));
+      result.success(done.outcome->success);
+      result.reason(done.outcome->reason);
       result.report(
-          report_of(*outcome_result, *task_result, goal.seed(), since(before, shares_of(pool_.status())), seen));
-    } else {
-      const Error& error = outcome_result.error();
+          report_of(*done.outcome, *task_result, goal.seed(), since(before, shares_of(pool_.status())), done.seen));
+    }
+    if (!done.ended) {
+      const Error& error = done.ended.error();
       const bool was_cancelled = error.code == Code::kCancelled;
       result.ending(on_the_wire(was_cancelled ? planners::Ending::kCancelled : planners::Ending::kBroken));
       result.reason(was_cancelled ? "cancelled" : "the system failed");
@@ -275,27 +275,32 @@ void Coordinator::answer(const jostle_msgs::msg::GoalResult& result, std::stop_t
   }
 }
 
-Result<planners::Outcome> Coordinator::perform(const Goal& goal, Task& task,
-                                               std::vector<jostle_msgs::msg::Observation>& seen, std::stop_token stop) {
+Coordinator::Performance Coordinator::perform(const Goal& goal, Task& task, std::stop_token stop) {
   const physics_pool::TaskGeometry& geometry = task.geometry();
   world::RobotClient robot(participant_);
   world::ObjectsClient objects(participant_, robot);
   const std::string goal_text = fmt::format("goal {}: ", shown(goal.goal_id()));
   tell(run_writer_, describe_run(goal), goal_text + "its beginning");
+  Performance performance;
   const Task::Watch watch{
-      .on_event = [&](const planners::ControlEvent& event) { note(event, geometry); },
+      .on_event =
+          [&](const planners::ControlEvent& event) {
+            note(event, geometry);
+            if (event.phase == planners::Phase::kDone) performance.outcome = event.outcome;
+          },
       .on_progress = [&](const planners::Progress& progress) { note(progress, geometry); },
       .journal = {.on_observation =
                       [&](const jostle_msgs::msg::Observation& news) {
                         tell(observation_writer_, news, fmt::format("{}observation {}", goal_text, news.number()));
-                        seen.push_back(news);
+                        performance.seen.push_back(news);
                       },
                   .on_plan =
                       [&](const jostle_msgs::msg::Plan& plan) {
                         tell(plan_writer_, plan, fmt::format("{}plan {}", goal_text, plan.number()));
                       }},
       .time = [&] { return robot.time(); }};
-  return task.perform(robot, objects, watch, std::move(stop));
+  if (auto ended = task.perform(robot, objects, watch, std::move(stop)); !ended) performance.ended = ended.error();
+  return performance;
 }
 
 void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
@@ -317,8 +322,8 @@ void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
 void Coordinator::note(const planners::ControlEvent& event, const physics_pool::TaskGeometry& geometry) {
   const std::lock_guard lock(mutex_);
   feedback_.phase(word(event.phase));
-  feedback_.actions(event.actions);
-  feedback_.replans(event.replans);
+  feedback_.actions(event.outcome.actions);
+  feedback_.replans(event.outcome.replans);
   if (event.phase == planners::Phase::kPlanning) rollouts_before_ = feedback_.rollouts();
   if (event.observed && !event.observed->q.empty()) {
     feedback_.target_distance(geometry.kind->distance(geometry, *event.observed));

@@ -55,9 +55,13 @@ class Coordinator {
  private:
   using Goal = jostle_msgs::msg::Goal;
 
-  // Adds to `seen` what the journal is told.
-  Result<planners::Outcome> perform(const Goal& goal, Task& task, std::vector<jostle_msgs::msg::Observation>& seen,
-                                    std::stop_token stop);
+  // What the controller made of a task, however it ended.
+  struct Performance {
+    std::optional<planners::Outcome> outcome;         // none if the controller never began
+    std::vector<jostle_msgs::msg::Observation> seen;  // as the journal was told; entry i became outcome->observed[i]
+    Result<void> ended;
+  };
+  Performance perform(const Goal& goal, Task& task, std::stop_token stop);
   void serve(const Goal& goal, std::stop_token stop);
   void answer(const jostle_msgs::msg::GoalResult& result, std::stop_token stop);
   void refuse_goals_meanwhile(std::stop_token stop);

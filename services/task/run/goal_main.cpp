@@ -67,8 +67,7 @@ Result<jostle_msgs::msg::GoalResult> follow(GoalClient& client, common::LiveLine
     }
   }
   client.cancel();
-  if (client.wait(Clock::now() + kCancelPatience, {}))
-    return Error{Code::kCancelled, "interrupted; the task was cancelled"};
+  if (auto result = client.wait(Clock::now() + kCancelPatience, {})) return *std::move(result);
   return Error{Code::kCancelled, "interrupted; whether the task was cancelled is not known, nobody answered"};
 }
 
@@ -90,9 +89,9 @@ int perform(const RunOptions& options, double patience, std::stop_token stop) {
   auto result = follow(client, line, std::move(stop));
   line.finish();
   if (!result) return fail(result.error(), code_of(result.error()));
-  if (!result->error().empty()) return fail({Code::kUnavailable, result->error()}, common::kExitBroken);
   if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), common::kExitBroken);
-  return result->success() ? common::kExitOk : common::kExitFailed;
+  if (const std::string error = error_of(*result); !error.empty()) (void)fail({Code::kUnavailable, error}, 0);
+  return exit_code_of(*result);
 }
 
 }  // namespace

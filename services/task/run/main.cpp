@@ -30,15 +30,18 @@ int perform(const RunOptions& options, std::stop_token stop) {
   }
   auto result = (*session_result)->perform(stop);
   line.finish();
-  if (!result)
+  if (!result) {
+    session_result->reset();
+    if (!options.record.empty()) line.say("the bag without its end is {}", options.record.string());
     return fail(result.error(),
                 result.error().code == Code::kCancelled ? common::kExitInterrupted : common::kExitBroken);
-  if (!result->error().empty()) return fail({Code::kUnavailable, result->error()}, common::kExitBroken);
+  }
   const auto recorded = (*session_result)->finish_recording();
   session_result->reset();  // before drawing: every process it started is gone
   if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), common::kExitBroken);
   if (!recorded) return fail(recorded.error(), common::kExitBroken);
-  return result->success() ? common::kExitOk : common::kExitFailed;
+  if (const std::string error = error_of(*result); !error.empty()) (void)fail({Code::kUnavailable, error}, 0);
+  return exit_code_of(*result);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "physics_pool/scene/task_kind.hpp"
 #include "services/common/process/child_process.hpp"
+#include "services/common/process/exit_codes.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/results/results.hpp"
 
@@ -13,6 +14,7 @@ namespace jostle::task {
 namespace {
 
 using nlohmann::json;
+namespace endings = jostle_msgs::msg::GoalResult_Constants;
 
 constexpr std::size_t kMostFrames = 8;  // in the picture
 
@@ -118,10 +120,22 @@ Result<void> draw(const RunOptions& options, const json& report) {
   return drawn;
 }
 
+const char* headline(std::uint8_t ending) {
+  switch (ending) {
+    case endings::SUCCEEDED:
+      return "SUCCESS";
+    case endings::CANCELLED:
+      return "CANCELLED";
+    case endings::BROKEN:
+    case endings::REFUSED:
+      return "BROKEN";
+    default:
+      return "FAILURE";
+  }
+}
+
 void print_summary(const RunOptions& options, const json& report) {
   std::FILE* out = summary_of(options);
-  fmt::print(out, "\n{}: {}\n", report["success"].get<bool>() ? "SUCCESS" : "FAILURE",
-             report["reason"].get<std::string>());
   if (report["cost"].is_null()) {
     fmt::print(out, "  first plan   none was finished within {:.1f} s\n", report["total_seconds"].get<double>());
   } else {
@@ -155,10 +169,22 @@ json changes_of(const RunOptions& options) {
 
 }  // namespace
 
+std::string error_of(const jostle_msgs::msg::GoalResult& result) {
+  return result.ending() == endings::CANCELLED ? "interrupted; the task was cancelled" : result.error();
+}
+
 Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::GoalResult& result) {
+  std::FILE* out = summary_of(options);
+  if (result.report().empty() && !result.error().empty()) return {};
+  fmt::print(out, "\n{}: {}\n", headline(result.ending()), result.reason());
   json report = json::parse(result.report(), nullptr, false);
   if (report.is_discarded()) {
     return Error{Code::kInternal, "result: the coordinator's report is not JSON"};
+  }
+  if (!result.error().empty()) {  // a part that failed is the reason, not what the coordinator was told to do then
+    report["success"] = false;
+    report["ending"] = result.ending() == endings::CANCELLED ? "cancelled" : "broken";
+    report["reason"] = error_of(result);
   }
   report["controller"] = options.controller;
   report["predictor"] = options.predictor;
@@ -178,6 +204,20 @@ Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::Goa
     fmt::print(summary_of(options), "  numbers      {}\n", options.json.string());
   }
   return drawn;  // not before: numbers are worth more than a picture
+}
+
+int exit_code_of(const jostle_msgs::msg::GoalResult& result) {
+  switch (result.ending()) {
+    case endings::SUCCEEDED:
+      return common::kExitOk;
+    case endings::CANCELLED:
+      return common::kExitInterrupted;
+    case endings::BROKEN:
+    case endings::REFUSED:
+      return common::kExitBroken;
+    default:
+      return common::kExitFailed;
+  }
 }
 
 }  // namespace jostle::task

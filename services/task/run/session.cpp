@@ -182,25 +182,32 @@ Result<common::ChildProcess> Session::start_worker(std::size_t place) {
 }
 
 Result<jostle_msgs::msg::GoalResult> Session::perform(std::stop_token stop) {
-  std::optional<Clock::time_point> cancelled;
   for (;;) {
-    if (auto result = client_.wait(Clock::now() + kTick, cancelled ? std::stop_token{} : stop)) {
-      if (cancelled) return Error{Code::kCancelled, "interrupted; the task was cancelled"};
-      return *std::move(result);
-    }
-    if (stop.stop_requested() && !cancelled) {
-      cancelled = Clock::now();
-      client_.cancel();  // if it is lost, the coordinator is ended after kCancelPatience
-    }
-    if (cancelled && (!client_.is_sent() || Clock::now() - *cancelled > kCancelPatience)) {
-      return Error{Code::kCancelled, "interrupted"};
-    }
+    if (auto result = client_.wait(Clock::now() + kTick, stop)) return *std::move(result);
+    if (stop.stop_requested()) return give_up({Code::kCancelled, "interrupted"});
     client_.listen();
-    if (auto ok = look_after(); !ok) return ok.error();
-    if (!client_.is_sent() && !cancelled) {
-      if (auto ok = send_goal(); !ok) return ok.error();
-    }
+    if (auto ok = look_after(); !ok) return give_up(ok.error());
+    if (client_.is_sent()) continue;
+    if (auto ok = send_goal(); !ok) return ok.error();
   }
+}
+
+// The coordinator knows what has come of the run so far.
+Result<jostle_msgs::msg::GoalResult> Session::give_up(const Error& why) {
+  if (!client_.is_sent() || coordinator_process_->ended()) return why;
+  client_.cancel();  // if it is lost, the coordinator is ended after kCancelPatience
+  const auto deadline = Clock::now() + kCancelPatience;
+  while (Clock::now() < deadline) {
+    auto result = client_.wait(Clock::now() + kTick, {});
+    if (!result) continue;
+    if (why.code == Code::kCancelled) return *std::move(result);
+    result->success(false);
+    result->ending(jostle_msgs::msg::GoalResult_Constants::BROKEN);
+    result->reason("the system failed");
+    result->error(why.message);
+    return *std::move(result);
+  }
+  return why;
 }
 
 // The goal goes out once everybody who has a part in it was heard and hears us.

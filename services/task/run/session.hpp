@@ -65,8 +65,8 @@ class Session {
   static Result<std::unique_ptr<Session>> start(const RunOptions& options, Watcher watcher);
   ~Session();
 
-  /// Sends the goal and waits for its result.
-  /// Errors   kCancelled    a stop was requested; the task was cancelled
+  /// Sends the goal and waits for its result. A stop cancels the task, whose result then says so.
+  /// Errors   kCancelled    a stop was requested, and no result came of it
   ///          kUnavailable  a part of the system is gone; the message says which
   Result<jostle_msgs::msg::GoalResult> perform(std::stop_token stop);
 
@@ -84,6 +84,7 @@ class Session {
   Result<void> start_processes();
   Result<common::ChildProcess> start_worker(std::size_t place);  // index among the workers
   Result<void> look_after();
+  Result<jostle_msgs::msg::GoalResult> give_up(const Error& why);
   void look_after_recorder();
   Result<void> check_recording() const;
   Result<void> check_alive(const std::string& name, common::ChildProcess& child) const;

@@ -40,8 +40,8 @@ bool RobotClient::is_robot(std::uint64_t writer) {
   return robot_ == writer || !robot_;
 }
 
-Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::stop_token stop) {
-  const auto patience = heard_ ? options_.silence : options_.start;
+Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::chrono::milliseconds patience,
+                                                               std::stop_token stop) {
   const auto deadline = steady_clock::now() + patience;
   std::string problem;
   for (;;) {
@@ -77,7 +77,7 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::stop_token s
 Result<robot_bridge::RobotReading> RobotClient::read() {
   status_.take_all();  // yesterday's news
   for (;;) {
-    auto status_result = next_status({});
+    auto status_result = next_status(patience(), {});
     if (!status_result) return status_result.error();
     const bool current = sequence_number_ == 0 ||
                          (status_result->epoch() == epoch_ && status_result->sequence_number() == sequence_number_);
@@ -95,7 +95,7 @@ Result<void> RobotClient::wait_for_robot(std::stop_token stop) {
                                                    wire::topics::kRobotStatus.name, wire::topics::kRobotCommand.name,
                                                    static_cast<double>(options_.start.count()) / 1e3)};
     }
-    if (auto status_result = next_status(stop); !status_result) return status_result.error();
+    if (auto status_result = next_status(patience(), stop); !status_result) return status_result.error();
   }
   return {};
 }
@@ -103,7 +103,7 @@ Result<void> RobotClient::wait_for_robot(std::stop_token stop) {
 Result<void> RobotClient::wait_until_finished(const jostle_msgs::msg::VelocityCommand& command, std::stop_token stop) {
   auto idle_since = steady_clock::now();
   for (;;) {
-    auto status_result = next_status(stop);
+    auto status_result = next_status(patience(), stop);
     if (!status_result) return status_result.error();
     const auto now = steady_clock::now();
     if (status_result->busy()) {
@@ -140,8 +140,10 @@ Result<void> RobotClient::halt() {
   const auto deadline = steady_clock::now() + options_.silence;
   if (command_.write(stop_message(epoch_, ++sequence_number_))) {
     while (steady_clock::now() < deadline) {
-      auto status_result = next_status({});
-      if (!status_result) return status_result.error();
+      auto status_result = next_status(options_.stopping, {});
+      if (!status_result) {
+        return Error{status_result.error().code, "robot: told to stop; " + status_result.error().message};
+      }
       const bool obeyed = status_result->epoch() == epoch_ && status_result->sequence_number() >= sequence_number_;
       if (obeyed && !status_result->busy()) return {};
     }

@@ -26,6 +26,8 @@ struct WorldClientOptions {
   std::chrono::milliseconds silence{5000};
   /// Grace for discovery before the first message.
   std::chrono::milliseconds start{5000};
+  /// A robot that was told to stop and says nothing for so long is given up: whoever stops it waits.
+  std::chrono::milliseconds stopping{1500};
 };
 
 /// Commands go to `rt/robot/command`; `rt/robot/status` tells when one is done. A stop
@@ -51,8 +53,9 @@ class RobotClient final : public robot_bridge::Robot {
   /// Whether a status that this participant wrote is the robot's.
   bool is_robot(std::uint64_t writer);
 
-  /// Waits for the next good status.
-  Result<jostle_msgs::msg::RobotStatus> next_status(std::stop_token stop);
+  /// Waits for the next good status; see patience().
+  Result<jostle_msgs::msg::RobotStatus> next_status(std::chrono::milliseconds patience, std::stop_token stop);
+  std::chrono::milliseconds patience() const { return heard_ ? options_.silence : options_.start; }
 
   /// Waits until the sender of the statuses reads our commands. It does not count that others read them.
   Result<void> wait_for_robot(std::stop_token stop);

@@ -204,12 +204,16 @@ TEST_P(ArmParts_Stops, EndTheRunAndTheNextOneGrasps) {
 }
 INSTANTIATE_TEST_SUITE_P(, ArmParts_Stops, ::testing::Values("protective stop", "emergency stop", "reboot"));
 
-TEST_F(ArmRun, OfAPusherIsRefusedByTheRobotsName) {
+TEST_F(ArmRun, OfAPusherOrAWrongNameIsRefusedAndNobodyIsWaitedForAloud) {
   const std::string push = folder.path() / "push.yaml";
   ASSERT_EQ(program("jostle_scene", {"generate", "--chapter", "6", "-o", push})->wait(kPatience), 0);
   start({push, "--arm", "ur-sim"});
   EXPECT_NE(run->wait(kPatience), 0);
   EXPECT_THAT(run->err(), HasSubstr("wanted planar_gripper"));
+  const auto nobody = program("jostle_run", {easy, "--arm", "ur:127.0.3.3", "--headless"});
+  EXPECT_TRUE(nobody->says("waiting: 127.0.3.3:30004: connecting: Connection refused", kPatience)) << nobody->err();
+  nobody->signal(SIGINT);
+  EXPECT_EQ(nobody->wait(kPatience), 130);
   const auto wrong = program("jostle_run", {easy, "--arm", "ur6"});
   EXPECT_EQ(wrong->wait(kPatience), 2);
   EXPECT_THAT(wrong->err(), HasSubstr("wanted sim, ur-sim or ur:HOST"));

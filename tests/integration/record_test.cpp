@@ -397,7 +397,7 @@ TEST_F(Record, EndsBeforeASmallDiskIsFullAndNothingItTookIsLost) {
 TEST_F(Record, RefusesToStartWithLessFreeDiskThanAskedFor) {
   const auto refused = program("jostle_record", {"-o", bag(), "--min-free", "1000000TB"});
 
-  EXPECT_EQ(refused->wait(kPatience), 2);
+  EXPECT_EQ(refused->wait(kPatience), 3);
   EXPECT_THAT(refused->err(), HasSubstr("--min-free"));
   EXPECT_FALSE(std::filesystem::exists(bag()));
 }

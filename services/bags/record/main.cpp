@@ -144,7 +144,7 @@ int record(RecordOptions options, const std::string& json, std::stop_token stop)
                                           .on_snapshot = [&](const auto& bag) { line.say("wrote {}", bag.string()); }});
   if (!recorder_result) {
     line.say("{}", recorder_result.error().message);
-    return recorder_result.error().code == Code::kInvalidArgument ? common::kExitUsage : common::kExitBroken;
+    return common::exit_code_of(recorder_result.error());
   }
   Recorder& recorder = **recorder_result;
   snapshooter = &recorder;

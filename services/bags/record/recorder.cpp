@@ -86,7 +86,7 @@ class Recorder::OpenBag {
 
 Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher watcher) {
   std::unique_ptr<Recorder> recorder(new Recorder(std::move(options), std::move(watcher)));
-  if (auto ok = recorder->check_disk(); !ok) return Error{Code::kInvalidArgument, ok.error().message};
+  if (auto ok = recorder->check_disk(); !ok) return ok.error();
   const RecordOptions& own = recorder->options_;
   auto subscriptions_result = Subscriptions::open(
       {.domain = own.domain,
@@ -346,9 +346,12 @@ Result<void> Recorder::check_disk() const {
   auto free_result = free_disk(options_.folder);
   if (!free_result) return free_result.error();
   if (*free_result >= options_.min_free) return {};
-  return Error{Code::kIo,
-               fmt::format("{}: got {:.0f} MiB of free disk, wanted at least {:.0f}; make room, or say --min-free",
-                           options_.folder.string(), mebibytes(*free_result), mebibytes(options_.min_free))};
+  return Error{
+      Code::kIo,
+      fmt::format(
+          "{}: got {:.0f} MiB of free disk, wanted at least {:.0f}; make room, or let `jostle record --min-free` do "
+          "with less",
+          options_.folder.string(), mebibytes(*free_result), mebibytes(options_.min_free))};
 }
 
 std::uint64_t Recorder::lost(int topic) const {

@@ -80,9 +80,10 @@ class Recorder {
   };
 
   /// Starts a recorder, which is subscribed when this returns.
-  /// Errors   kInvalidArgument  the folder exists, less free disk than min_free, a selection without
-  ///                            results for until_result, a domain that is none
-  ///          kIo, kUnavailable
+  /// Errors   kInvalidArgument  the folder exists, a selection without results for until_result, a domain
+  ///                            that is none
+  ///          kIo               less free disk than min_free, or the folder cannot be made
+  ///          kUnavailable
   static Result<std::unique_ptr<Recorder>> start(RecordOptions options, Watcher watcher);
   ~Recorder();
 

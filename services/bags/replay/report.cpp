@@ -36,6 +36,9 @@ std::string verdict(const RecordedRun& recorded, const ReplayReport& report) {
   const Comparison& comparison = report.comparison;
   const std::string counts = fmt::format("{} of {} plans, {} of {} actions", comparison.equal_plans, comparison.plans,
                                          comparison.equal_actions, comparison.actions);
+  if (comparison.bit_equal() && comparison.plans == 0) {
+    return "NOTHING TO COMPARE: the recorded run ended before its first plan\n";
+  }
   if (comparison.bit_equal()) {
     std::string text = fmt::format("BIT-EQUAL: {}\n", counts);
     for (const Change& change : report.changes) {

@@ -150,6 +150,13 @@ std::string ChildProcess::last_words() const {
   return text;
 }
 
+std::string ChildProcess::last_line() const {
+  std::ifstream in(log_);
+  std::string last;
+  for (std::string line; std::getline(in, line);) last = std::move(line);
+  return last;
+}
+
 Result<void> run_tool(const std::string& name, const std::string& package, const std::vector<std::string>& arguments,
                       const std::filesystem::path& log) {
   const char* path = std::getenv("PATH");

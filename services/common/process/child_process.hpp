@@ -57,6 +57,8 @@ class ChildProcess {
 
   /// The last lines it printed, for an error message.
   std::string last_words() const;
+  /// The last line it printed; empty before the first.
+  std::string last_line() const;
 
  private:
   ChildProcess(pid_t pid, std::filesystem::path log) : pid_(pid), log_(std::move(log)) {}

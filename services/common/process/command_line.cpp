@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <cstdint>
 #include <optional>
 #include <regex>
@@ -340,6 +341,18 @@ std::string verbatim(const std::string& text) {
 }
 
 }  // namespace
+
+CLI::Option* add_seed_option(CLI::App& app, const std::string& name, std::uint64_t& seed, const std::string& help) {
+  const CLI::Validator whole(
+      [](std::string& text) {
+        std::uint64_t value = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        if (error == std::errc() && end == text.data() + text.size()) return std::string();
+        return fmt::format("got '{}', wanted a whole number from 0 to {}", text, UINT64_MAX);
+      },
+      "");
+  return app.add_option(name, seed, help)->capture_default_str()->check(whole);
+}
 
 void suggest(CLI::Option* option, const std::vector<std::string>& values) {
   const auto anything = [](std::string&) { return std::string(); };

@@ -3,6 +3,7 @@
 /// What all command lines have in common beside parsing: mistakes in our words, completion, manual pages. All of it
 /// comes from the options as CLI11 has them.
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,10 @@ namespace jostle::common {
 /// Names values that an option takes, for completion; those that its check lists (CLI::IsMember) need no more. An
 /// option of text without any is completed with files; `values` empty: with nothing.
 void suggest(CLI::Option* option, const std::vector<std::string>& values);
+
+/// Adds an option for the seed of random numbers, a whole number of 64 bits: a longer one is refused, where CLI11 would
+/// take the largest.
+CLI::Option* add_seed_option(CLI::App& app, const std::string& name, std::uint64_t& seed, const std::string& help);
 
 /// Says what is wrong with a command line that CLI11 refused, with the program's name before it: what was got, what is
 /// wanted, or which option was meant.

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "services/common/charts/gnuplot.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/cores.hpp"
 #include "services/common/process/domain_claim.hpp"
 #include "services/common/process/files.hpp"
@@ -146,7 +147,7 @@ class Chaos final : public Benchmark {
   using Benchmark::Benchmark;
 
   void add_options(CLI::App& app) override {
-    app.add_option("--seed", options_.seed, "Seed of the schedule of faults")->capture_default_str();
+    common::add_seed_option(app, "--seed", options_.seed, "Seed of the schedule of faults");
     app.add_option("--faults", options_.faults, "How many faults; three or so a second")
         ->capture_default_str()
         ->check(CLI::Range(1, 1'000'000));

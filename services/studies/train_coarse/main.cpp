@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "physics_pool/local/thread_pool.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/results/results.hpp"
@@ -118,8 +119,7 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   data->add_option("--samples", arguments.collect.samples, "Transitions the file is to have")
       ->capture_default_str()
       ->check(CLI::Range(1u, 4'000'000'000u));
-  data->add_option("--seed", arguments.collect.origin.seed, "Equal seeds give equal files")
-      ->capture_default_str()
+  common::add_seed_option(*data, "--seed", arguments.collect.origin.seed, "Equal seeds give equal files")
       ->check(CLI::Range(0u, 4'000'000'000u));
   data->add_option("--pool", arguments.pool, "threads: in this process; dds: worker processes")
       ->capture_default_str()
@@ -149,8 +149,7 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   fits->add_option("--no-penetration-weight", arguments.fit.no_penetration_weight, "W_F of Eq. 7.5")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e6));
-  fits->add_option("--seed", arguments.fit.seed, "Of the first weights and the order of the data")
-      ->capture_default_str();
+  common::add_seed_option(*fits, "--seed", arguments.fit.seed, "Of the first weights and the order of the data");
   fits->add_option("--threads", arguments.fit.threads, "Of libtorch")
       ->capture_default_str()
       ->check(CLI::Range(1, 1024));

@@ -5,7 +5,9 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "idl/text/nearest.hpp"
 #include "services/common/process/program.hpp"
 #include "services/task/config/parameter_keys.hpp"
 
@@ -96,7 +98,8 @@ int main(int argc, char** argv) {
   app.add_option("keys", wanted, "Keys, or sections such as planner (default: all)");
   app.add_flag("--json", json, "Print JSON");
   app.add_flag("--markdown", markdown, "Print a table as docs/parameters.md has it");
-  app.add_option("--file", file_of, "Print a complete parameter file of this kind, grasping or pushing, to start from");
+  app.add_option("--file", file_of, "Print a complete parameter file of this kind, grasping or pushing, to start from")
+      ->excludes("keys");
   app.footer("Exit codes: 0 done, 2 an unknown key.");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
 
@@ -117,7 +120,12 @@ int main(int argc, char** argv) {
     if (std::ranges::any_of(keys, [&](const ParameterKey& key) { return key.path() == word || key.section == word; })) {
       continue;
     }
-    return fail(invalid("keys", "'" + word + "'", "a key or a section; `jostle parameters` lists all"));
+    std::set<std::string> known;
+    for (const ParameterKey& key : keys) known.insert({key.path(), key.section});
+    const std::string near = nearest(word, known);
+    return fail(invalid(
+        "keys", "'" + word + "'",
+        "a key or a section; " + (near.empty() ? "`jostle parameters` lists all" : "did you mean " + near + "?")));
   }
   std::erase_if(keys, [&](const ParameterKey& key) {
     return !wanted.empty() && std::ranges::none_of(wanted, [&](const std::string& word) {

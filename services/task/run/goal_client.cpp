@@ -20,7 +20,7 @@ void GoalClient::listen() {
     if (sent_ && writer != coordinator_) continue;
     coordinator_heard_ = Clock::now();
     // Ours is idle until it gets our goal; it may be the last one we hear of.
-    if (!sent_ && !feedback.goal_id().empty()) others_heard_ = true;
+    if (!sent_ && !feedback.goal_id().empty()) others_heard_ = Clock::now();
     if (!sent_ || feedback.goal_id() != goal_id_) continue;
     if (listener_.on_feedback) listener_.on_feedback(feedback);
     if (std::exchange(trouble_, feedback.trouble()) == feedback.trouble() || trouble_.empty()) continue;

@@ -38,8 +38,8 @@ class GoalClient {
   /// When a coordinator, or a world, was heard last.
   std::optional<Clock::time_point> coordinator_heard() const { return coordinator_heard_; }
   std::optional<Clock::time_point> world_heard() const { return world_heard_; }
-  /// Whether a coordinator was heard that works for somebody else.
-  bool others_heard() const { return others_heard_; }
+  /// When a coordinator was heard last that works for somebody else.
+  std::optional<Clock::time_point> others_heard() const { return others_heard_; }
 
   /// Returns the participants that take goals and give feedback, ascending; whoever does only one of them looks on.
   std::vector<std::uint64_t> coordinators() const;
@@ -63,8 +63,7 @@ class GoalClient {
   bool sent_ = false;
   std::uint64_t coordinator_ = 0;  // its participant, once the goal was sent
   std::string trouble_;            // the coordinator's newest
-  bool others_heard_ = false;
-  std::optional<Clock::time_point> coordinator_heard_, world_heard_;
+  std::optional<Clock::time_point> coordinator_heard_, world_heard_, others_heard_;
 
   wire::Writer<jostle_msgs::msg::Goal> goal_;
   wire::Writer<jostle_msgs::msg::Cancel> cancel_;

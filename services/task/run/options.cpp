@@ -46,7 +46,7 @@ void add_goal_options(CLI::App& app, GoalArguments& arguments, RunOptions& optio
                                      "How wrong the planner's belief about the world is: none, low, medium or high")
                           ->capture_default_str();
   common::suggest(uncertainty, {"none", "low", "medium", "high"});
-  app.add_option("--seed", options.seed, "Seed of all noise, the planner's and the world's")->capture_default_str();
+  common::add_seed_option(app, "--seed", options.seed, "Seed of all noise, the planner's and the world's");
   app.add_option("--parameters", arguments.parameters.file,
                  "Parameter file (YAML) of planner and controller; what it leaves out keeps its default.\n"
                  "`jostle parameters` lists keys and defaults");

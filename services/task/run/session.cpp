@@ -19,8 +19,10 @@ constexpr std::chrono::seconds kLongSilence{10};     // it does not come back
 constexpr std::chrono::seconds kStart{15};           // for processes to start and find each other
 constexpr std::chrono::milliseconds kTick{50};
 constexpr std::chrono::seconds kCancelPatience{2};
-constexpr std::chrono::seconds kLastWords{2};  // for the recorder to hear of the result, and end
-constexpr int kMostRestarts = 5;               // within kRestartWindow: something is wrong
+constexpr std::chrono::milliseconds kLately{500};  // a coordinator speaks ten times a second
+constexpr std::chrono::seconds kLeaving{2};        // for one whose run was killed just now
+constexpr std::chrono::seconds kLastWords{2};      // for the recorder to hear of the result, and end
+constexpr int kMostRestarts = 5;                   // within kRestartWindow: something is wrong
 constexpr std::chrono::seconds kRestartWindow{10};
 
 std::filesystem::path program(const char* name) { return common::program_folder() / (std::string("jostle_") + name); }
@@ -83,7 +85,8 @@ Result<void> Session::start_recorder() {
   while (!recorder_process_->has_said("ready")) {
     const auto ended = recorder_process_->wait_for(kTick);
     if (ended || Clock::now() >= deadline) {
-      const Error error{ended ? Code::kInvalidArgument : Code::kUnavailable,
+      const bool refused = ended && ended->code == common::kExitUsage;
+      const Error error{refused ? Code::kInvalidArgument : Code::kUnavailable,
                         fmt::format("the recorder {}:\n{}", ended ? "did not start" : "is not ready",
                                     recorder_process_->last_words())};
       recorder_process_.reset();
@@ -213,17 +216,22 @@ Result<jostle_msgs::msg::GoalResult> Session::give_up(const Error& why) {
 // The goal goes out once everybody who has a part in it was heard and hears us.
 Result<void> Session::send_goal() {
   const std::vector<std::uint64_t> found = client_.coordinators();
-  if (client_.others_heard() || found.size() > 1) {
+  const auto now = Clock::now();
+  if (found.size() > 1 || now - client_.others_heard().value_or(Clock::time_point{}) < kLately) {
+    crowded_since_ = crowded_since_.value_or(now);
+    if (now - *crowded_since_ < kLeaving) return {};
     return Error{Code::kUnavailable,
                  fmt::format("domain {}: got another coordinator beside ours, wanted none; another run or a `jostle "
                              "play` uses this domain: set ROS_DOMAIN_ID to a free one, or --namespace to one of its "
                              "own; `jostle goal` gives a goal to a coordinator that runs",
                              participant_.domain())};
   }
+  crowded_since_.reset();
   // Another one may be found before ours is there: it says its number when it starts.
   const bool ours = found.size() == 1 && coordinator_process_->has_said(common::participant_name(found.front()));
   const bool answers = ours && client_.reaches(found.front());
   if (!answers || !client_.world_heard()) {
+    tell_of_waiting();
     if (Clock::now() < goal_deadline_) return {};
     return Error{Code::kUnavailable,
                  fmt::format("{} not heard within {} s of its start on domain {}; `jostle doctor` checks "
@@ -237,6 +245,14 @@ Result<void> Session::send_goal() {
                fmt::format("the goal could not be sent within {} s: the middleware did not take it; profiles that "
                            "limit {} may be the reason",
                            goal_patience_.count(), wire::topics::kTaskGoal.name)};
+}
+
+// An arm that is not there, or not ready, keeps everybody waiting, and its bridge knows why.
+void Session::tell_of_waiting() {
+  const std::string line = world_.back().process.last_line();
+  if (line.find("waiting:") == std::string::npos || line == waiting_) return;
+  waiting_ = line;
+  notice(line);
 }
 
 Result<void> Session::look_after() {

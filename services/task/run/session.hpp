@@ -95,6 +95,7 @@ class Session {
   };
 
   // Says when a voice, heard last at `heard`, falls silent, and when it is heard again.
+  void tell_of_waiting();
   void look_for(Voice& voice, std::optional<Clock::time_point> heard);
   void notice(const std::string& text) const;
   Result<void> send_goal();
@@ -106,6 +107,8 @@ class Session {
   std::filesystem::path folder_;  // for logs and the scene; removed at the end
   int workers_started_ = 0;
   Clock::time_point goal_deadline_;
+  std::optional<Clock::time_point> crowded_since_;  // another coordinator is there, too
+  std::string waiting_;                             // what the world said last of why it is not ready
   std::chrono::seconds goal_patience_{};
   Voice coordinator_{"the coordinator"}, robot_{"the robot"};
   GoalClient client_;

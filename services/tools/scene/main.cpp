@@ -18,6 +18,7 @@
 #include "physics_pool/scene/scene.hpp"
 #include "physics_pool/scene/task_kind.hpp"
 #include "physics_pool/uncertainty/belief.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
 
@@ -239,7 +240,7 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
                    "Sec. 7.4, pushing among sliders")
       ->check(CLI::IsMember({3, 6, 7}))
       ->capture_default_str();
-  generates->add_option("--seed", arguments.generate.seed, "equal seeds give equal scenes")->capture_default_str();
+  common::add_seed_option(*generates, "--seed", arguments.generate.seed, "equal seeds give equal scenes");
   generates->add_option(
       "--objects", arguments.objects,
       "objects beside the target: 0 to 40, default 15, of Chapter 3; 0 to 3, default 3, of Chapter 7");
@@ -266,7 +267,7 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   perturbs->add_option("--uncertainty", arguments.uncertainty, "none, low, medium or high")
       ->check(CLI::IsMember({"none", "low", "medium", "high"}))
       ->capture_default_str();
-  perturbs->add_option("--seed", arguments.seed, "equal seeds give equal beliefs")->capture_default_str();
+  common::add_seed_option(*perturbs, "--seed", arguments.seed, "equal seeds give equal beliefs");
   add_output(*perturbs, arguments);
 
   CLI::App* shows = command("show", "list the objects of a scene", show);

@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
       app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")
           ->capture_default_str();
   common::suggest(uncertainty, {"none", "low", "medium", "high"});
-  app.add_option("--seed", seed, "Of the noise")->capture_default_str();
+  common::add_seed_option(app, "--seed", seed, "Of the noise");
   app.add_option("--belief", belief_file,
                  "The planner's scene: where its objects are is what is measured first (default: drawn as\n"
                  "`jostle scene perturb` does from --uncertainty and --seed)");

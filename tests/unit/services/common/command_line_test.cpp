@@ -25,7 +25,7 @@ class CommandLine : public testing::Test {
     suggest(controller, {"or", "nr", "mpc"});
     app.add_option("--pool", word, "Where")->check(CLI::IsMember({"dds", "threads"}));
     add_count_option(app, "--workers", count, 0, "How many");
-    app.add_option("--seed", seed, "Of the noise");
+    add_seed_option(app, "--seed", seed, "Of the noise");
     app.add_option("--rate", rate, "Speed")->check(CLI::Range(0.0, 1000.0))->capture_default_str();
     app.add_option("--length", rate, "How long")->check(CLI::PositiveNumber);
     app.add_option("--json", word, "File");
@@ -53,7 +53,8 @@ class CommandLine : public testing::Test {
   CLI::App app{"Plans a scene.", "jostle run"};
   CLI::App bag{"Looks into recordings.", "jostle bag"};
   std::string scene, word;
-  int count = 0, seed = 0;
+  int count = 0;
+  std::uint64_t seed = 0;
   double rate = 1.0;
   bool flag = false;
 };
@@ -79,6 +80,8 @@ TEST_F(CommandLine, SaysWhatWasGotAndWhatIsWanted) {
       {{"x", "--workers", "1025"}, "--workers: got '1025', wanted auto or 0 to 1024"},
       {{"x", "--pool", "treads"}, "--pool: got 'treads', wanted dds, threads; did you mean threads?"},
       {{"x", "--seed", "abc"}, "--seed: got 'abc', wanted a whole number"},
+      {{"x", "--seed", "-1"}, "--seed: got '-1', wanted a whole number"},
+      {{"x", "--seed", "18446744073709551616"}, "--seed: got '18446744073709551616', wanted a whole number"},
       {{"x", "--rate", "2000"}, "--rate: got '2000', wanted 0 to 1000"},
       {{"x", "--length", "0"}, "--length: got '0', wanted a number above 0"},
       {{"x", "--json"}, "--json: got no value, wanted TEXT"},

@@ -55,10 +55,11 @@ class Fuzzer {
     start("jostle_worker", {"--threads", "2"});
     start("jostle_coordinator", {});
     start("jostle_sim", {scene_file_});
-    start("jostle_record", {"-o", folder_.path() / "bag"});
+    start("jostle_record", {"/*", "-o", folder_.path() / "bag"});  // of the pool, too
     for (const wire::SystemTopic& topic : wire::system_topics()) listen(topic);
     goals_.emplace(participant_, topic_of(wire::topics::kTaskGoal));
-    if (!goals_->wait_for_readers(in(kPatience), 2)) throw Failure("no coordinator, or no recorder");
+    constexpr int kReaders = 3;  // the coordinator, the recorder, and ours
+    if (!goals_->wait_for_readers(in(kPatience), kReaders)) throw Failure("no coordinator, or no recorder");
   }
 
   void run() {

@@ -317,6 +317,8 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
   };
   constexpr std::type_identity<Ratio> ratio;
   constexpr std::type_identity<RatioOfWorkers> of_workers;
+  add(ratio, "arm-cycle", "our client of an arm's controller against a bare loop: from sample to command", "2 min",
+      kDomain, 5, measure_arm_cycle);
   add(ratio, "bag", "messages into a bag against bare appends of the same bytes", "15 s", kNothing, 7, measure_bag);
   add(std::type_identity<Chaos>(), "chaos",
       "plans while workers are killed, stalled and unplugged: all bit-equal, and how slow", "2 min", kDomain);

@@ -3,15 +3,10 @@
 
 #include <gmock/gmock.h>
 
-#include <fmt/format.h>
-
-#include <array>
-#include <cmath>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "robot_bridge/net/tcp_client.hpp"
-#include "robot_bridge/ur/rtde.hpp"
-#include "tests/support/run_fixture.hpp"
+#include "tests/support/arm_parts.hpp"
 
 namespace jostle::tests {
 namespace {
@@ -19,54 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 using robot_bridge::net::TcpClient;
 using ::testing::HasSubstr;
-namespace rtde = robot_bridge::ur::rtde;
 using Clock = robot_bridge::net::Clock;
-
-constexpr double kStill = 0.01;  // rad/s
-constexpr std::uint16_t kPendant = 29990;
-
-// Listens to a controller, and commands nothing.
-class Onlooker {
- public:
-  explicit Onlooker(const std::string& address) {
-    soon(kPatience, [&] {
-      auto tcp = TcpClient::connect(address, rtde::kPort, Clock::now() + 1s);
-      if (tcp) tcp_.emplace(std::move(*tcp));
-      return tcp_.has_value();
-    });
-    if (!tcp_) throw std::runtime_error("no controller at " + address);
-    for (const auto& packet :
-         {rtde::protocol_request(2), rtde::outputs_request(125, {"timestamp", "actual_qd"}), rtde::start_request()}) {
-      if (!tcp_->write(rtde::encode(packet), Clock::now() + kPatience)) throw std::runtime_error("it does not listen");
-    }
-  }
-
-  struct Sample {
-    double time = 0.0, fastest = 0.0;  // s of the controller, rad/s of the fastest joint
-  };
-  Sample next() {
-    std::array<std::uint8_t, 4096> room;
-    for (;;) {
-      auto packet = stream_.next();
-      if (!packet) throw std::runtime_error(packet.error().message);
-      if (*packet && (*packet)->type == rtde::PacketType::kData) {
-        BigEndianReader in((*packet)->payload);
-        (void)in.get<std::uint8_t>();
-        Sample sample{.time = in.get<double>()};
-        for (const double v : in.get_array<double, 6>()) sample.fastest = std::max(sample.fastest, std::abs(v));
-        return sample;
-      }
-      if (*packet) continue;
-      auto bytes = tcp_->read(room, Clock::now() + kPatience);
-      if (!bytes) throw std::runtime_error(bytes.error().message);
-      stream_.append(*bytes);
-    }
-  }
-
- private:
-  std::optional<TcpClient> tcp_;
-  rtde::PacketStream stream_;
-};
 
 class ArmRun : public RunFixture {
  protected:
@@ -91,39 +39,6 @@ TEST_F(ArmRun, GraspsIsRecordedAndReplaysBitEqual) {
   EXPECT_EQ(replay->wait(kPatience), 0) << replay->out() << replay->err();
   EXPECT_THAT(replay->out(), HasSubstr("BIT-EQUAL"));
 }
-
-// A system whose parts were started one by one, so that each may die alone.
-class ArmParts : public RunFixture {
- protected:
-  // Until the arm moves towards the target; returns the onlooker's newest sample.
-  Onlooker::Sample start_moving() {
-    arm = program("jostle_ur_sim", {easy, "--address", address, "--pendant", std::to_string(kPendant)});
-    bridge = program("jostle_bridge", {"ur5", "--host", address, "--silence", silence, "--watchdog", watchdog});
-    coordinator = program("jostle_coordinator", {});
-    worker = program("jostle_worker", {"--threads", "2"});
-    EXPECT_TRUE(bridge->says("ready on domain", kPatience)) << bridge->err() << arm->err();
-    goal = program("jostle_goal", {easy, "--parameters", plain, "--headless"});
-    onlooker = std::make_unique<Onlooker>(address);
-    Onlooker::Sample sample;
-    const auto deadline = Clock::now() + kPatience;
-    while (sample.fastest < 5 * kStill && Clock::now() < deadline) sample = onlooker->next();
-    EXPECT_GE(sample.fastest, 5 * kStill) << goal->err() << coordinator->err() << bridge->err();
-    return sample;
-  }
-
-  // Seconds of the controller's clock until it stands still; at most 3.
-  double time_to_stand(double since) {
-    Onlooker::Sample sample;
-    do sample = onlooker->next();
-    while (sample.fastest > kStill && sample.time < since + 3.0);
-    return sample.time - since;
-  }
-
-  const std::string address = fmt::format("127.0.1.{}", domain + 1);
-  std::string silence = "1", watchdog = "1";  // s: on a busy machine a commander and a bridge may be late
-  std::unique_ptr<ProgramProcess> arm, bridge, coordinator, worker, goal;
-  std::unique_ptr<Onlooker> onlooker;
-};
 
 class ArmParts_Deaths : public ArmParts, public ::testing::WithParamInterface<int> {};
 

@@ -13,6 +13,7 @@ namespace {
 
 // An address of this host's own for each domain, so that several runs have controllers with the same ports.
 std::string controller_address(int domain) { return fmt::format("127.0.1.{}", domain + 1); }
+std::string mocap_address(int domain) { return fmt::format("127.0.6.{}", domain + 1); }
 
 }  // namespace
 
@@ -23,6 +24,15 @@ Result<Arm> parse_arm(const std::string& text) {
   if (text.starts_with(kUr) && text.size() > kUr.size())
     return Arm{.kind = Arm::Kind::kUr, .host = text.substr(kUr.size())};
   return Error{Code::kInvalidArgument, fmt::format("--arm: got '{}', wanted sim, ur-sim or ur:HOST", text)};
+}
+
+Result<Sensor> parse_sensor(const std::string& text) {
+  constexpr std::string_view kMocap = "mocap:";
+  if (text == "sim") return Sensor{};
+  if (text == "mocap-sim") return Sensor{.kind = Sensor::Kind::kMocapSim, .host = {}};
+  if (text.starts_with(kMocap) && text.size() > kMocap.size())
+    return Sensor{.kind = Sensor::Kind::kMocap, .host = text.substr(kMocap.size())};
+  return Error{Code::kInvalidArgument, fmt::format("--objects: got '{}', wanted sim, mocap-sim or mocap:HOST", text)};
 }
 
 std::vector<Part> parts_of_world(const RunOptions& options, const std::filesystem::path& scene,
@@ -38,21 +48,39 @@ std::vector<Part> parts_of_world(const RunOptions& options, const std::filesyste
     arguments.insert(arguments.end(), more.begin(), more.end());
     return part("the bridge", "bridge", arguments);
   };
+  std::vector<Part> parts;
+  std::vector<std::string> seen_by;  // of what simulates the objects
+  if (options.sensor.kind != Sensor::Kind::kSim) {
+    const bool simulated = options.sensor.kind == Sensor::Kind::kMocapSim;
+    const std::string host = simulated ? mocap_address(domain) : options.sensor.host;
+    if (simulated) seen_by = {"--mocap", host};
+    // A simulated world has a clock of its own, which the frames tell.
+    const char* stamps = options.arm.kind == Arm::Kind::kSim ? "server" : "host";
+    parts.push_back(part("the eyes", "perceive", {"mocap", "--host", host, "--stamps", stamps}));
+  }
+  const auto simulating = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), seen_by.begin(), seen_by.end());
+    return arguments;
+  };
   switch (options.arm.kind) {
     case Arm::Kind::kUr:
-      return {bridge(options.arm.host, {})};
+      parts.push_back(bridge(options.arm.host, {}));
+      break;
     case Arm::Kind::kUrSim: {
       const std::string address = controller_address(domain);
-      return {part("the simulated arm", "ur_sim", {scene.string(), "--address", address}),
-              // It can do no harm, and this machine may be busy.
-              bridge(address, {"--silence", "1", "--watchdog", "1"})};
+      parts.push_back(part("the simulated arm", "ur_sim", simulating({scene.string(), "--address", address})));
+      // It can do no harm, and this machine may be busy.
+      parts.push_back(bridge(address, {"--silence", "1", "--watchdog", "1"}));
+      break;
     }
     case Arm::Kind::kSim:
+      parts.push_back(part("the simulated world", "sim",
+                           simulating({scene.string(), "--belief", belief.string(), "--uncertainty",
+                                       physics_pool::to_string(options.level), "--seed", std::to_string(options.seed),
+                                       "--rate", fmt::format("{}", options.rate)})));
       break;
   }
-  return {part("the simulated world", "sim",
-               {scene.string(), "--belief", belief.string(), "--uncertainty", physics_pool::to_string(options.level),
-                "--seed", std::to_string(options.seed), "--rate", fmt::format("{}", options.rate)})};
+  return parts;
 }
 
 std::chrono::seconds patience(const Arm& arm) {

@@ -1,6 +1,6 @@
 #pragma once
 /// \file
-/// What the commands of a run move: a simulated world, or an arm behind its own protocols.
+/// What the commands of a run move, a simulated world or an arm behind its own protocols; and who sees the objects.
 
 #include <chrono>
 #include <filesystem>
@@ -29,6 +29,21 @@ struct Arm {
 /// Error kInvalidArgument.
 Result<Arm> parse_arm(const std::string& text);
 
+/// What `--objects` names.
+struct Sensor {
+  enum class Kind {
+    kSim,       ///< the simulated world itself says where objects are
+    kMocapSim,  ///< motion capture that is simulated, behind its own protocol
+    kMocap      ///< motion capture
+  };
+  Kind kind = Kind::kSim;
+  std::string host;  ///< of a motion capture's server
+};
+
+/// Reads "sim", "mocap-sim" or "mocap:HOST".
+/// Error kInvalidArgument.
+Result<Sensor> parse_sensor(const std::string& text);
+
 /// A program that a run starts.
 struct Part {
   std::string title;    ///< "the simulated world"
@@ -36,7 +51,8 @@ struct Part {
   std::vector<std::string> arguments;
 };
 
-/// Returns what must run for the commands to move something, in the order of their start. `scene`, `belief`: files.
+/// Returns what must run for the commands to move something and the objects to be seen, in the order of their start;
+/// the last one is what obeys. `scene`, `belief`: files.
 std::vector<Part> parts_of_world(const RunOptions& options, const std::filesystem::path& scene,
                                  const std::filesystem::path& belief, int domain);
 

@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
   RunOptions options;
   options.workers = common::usable_cores();
   bool pin = false;
-  std::string arm = "sim";
+  std::string arm = "sim", objects = "sim";
   add_goal_options(app, arguments, options);
   common::add_count_option(app, "--workers", options.workers, 0,
                            "Worker processes, or threads; auto: one per core this process may use")
@@ -72,6 +72,11 @@ int main(int argc, char** argv) {
                  "What moves: sim, the planner's own robot; ur-sim, a UR5 behind a simulated controller;\n"
                  "ur:HOST, a UR5 (read docs/robots.md first)")
       ->capture_default_str();
+  app.add_option(
+         "--objects", objects,
+         "Who sees the objects: sim, the simulated world itself; mocap-sim, a motion capture that is simulated;\n"
+         "mocap:HOST, one that speaks NatNet (docs/perception.md)")
+      ->capture_default_str();
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   if (options.pool == "threads" && options.workers == 0) {
     return fail({Code::kInvalidArgument, "--workers: got 0, wanted at least 1 thread"}, common::kExitUsage);
@@ -83,6 +88,14 @@ int main(int argc, char** argv) {
   auto arm_result = parse_arm(arm);
   if (!arm_result) return fail(arm_result.error(), common::kExitUsage);
   options.arm = std::move(arm_result).value();
+  auto sensor_result = parse_sensor(objects);
+  if (!sensor_result) return fail(sensor_result.error(), common::kExitUsage);
+  options.sensor = std::move(sensor_result).value();
+  if (options.sensor.kind == Sensor::Kind::kMocap && options.arm.kind != Arm::Kind::kUr) {
+    return fail({Code::kInvalidArgument,
+                 "--objects: got " + objects + ", wanted sim or mocap-sim: the arm's world is simulated"},
+                common::kExitUsage);
+  }
   if (options.arm.kind != Arm::Kind::kSim && arguments.level != "none") {
     return fail({Code::kInvalidArgument, "--uncertainty: got --arm " + arm + ", wanted sim: only it is disturbed"},
                 common::kExitUsage);

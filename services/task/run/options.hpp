@@ -34,6 +34,7 @@ struct RunOptions {
   std::uint64_t seed = 1;
   double rate = 0.0;  ///< of the simulated world; 0: as fast as possible
   Arm arm;            ///< what moves
+  Sensor sensor;      ///< who sees the objects
   bool plan_only = false;
   bool headless = false;  ///< plain lines instead of a live display
   std::optional<int> domain;

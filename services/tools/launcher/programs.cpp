@@ -15,6 +15,7 @@ constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string
     {"bag", "look into recordings, check, save and export them"},
     {"bench", "measure physics, pools and planners on this machine"},
     {"bridge", "drive a robot by its own protocols"},
+    {"perceive", "publish what motion capture sees of the objects"},
     {"coordinator", "plan and re-plan with a pool of workers"},
     {"discovery-server", "introduce machines to each other where there is no multicast"},
     {"doctor", "say what is wrong with this machine, and the remedy"},

@@ -11,19 +11,15 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kStandingTransforms{1};  // between equal transforms
-
 }  // namespace
 
 SimulatedWorld::SimulatedWorld(const wire::Participant& participant, physics_pool::WorldPtr world,
-                               const SimulatedWorldOptions& options)
+                               const SimulatedWorldOptions& options, ObjectsOut& objects)
     : options_(options),
       world_(world, options.noise),
       still_(static_cast<std::size_t>(world->geometry().layout.nu), 0.0),
+      objects_(objects),
       joints_(participant, wire::topics::kJointStates),
-      objects_(participant, wire::topics::kObjectStates),
-      poses_(participant, wire::topics::kObjectPoses),
-      transforms_(participant, wire::topics::kTransforms),
       clock_(participant, wire::topics::kClock) {}
 
 std::vector<double> SimulatedWorld::limits() const {
@@ -66,19 +62,11 @@ void SimulatedWorld::publish() {
   const State seen =
       physics_pool::observed_state(world_.world().scene(), options_.belief, truth,
                                    moved_ ? physics_pool::Measurement::kFeedback : physics_pool::Measurement::kInitial);
-  const auto objects = to_message(object_readings(geometry.layout, seen), time);
   // States: when one is lost, the next one follows soon and says as much.
   rosgraph_msgs::msg::Clock clock;
   clock.clock(make_header(time).stamp());
   (void)clock_.write(clock);
-  (void)objects_.write(objects);
-  (void)poses_.write(pose_array_message(objects));
-  // tf2 complains of a transform that it has: while the world stands still, one now and then serves who comes late.
-  if (time != transforms_time_ || steady_clock::now() >= next_transforms_) {
-    transforms_time_ = time;
-    next_transforms_ = steady_clock::now() + kStandingTransforms;
-    (void)transforms_.write(transform_message(objects));
-  }
+  objects_.tell(object_readings(geometry.layout, seen), time);
   (void)joints_.write(joint_state_message(geometry.layout, truth, time));
 }
 

@@ -8,6 +8,7 @@
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/scene/scene.hpp"
 #include "services/world/in_process/in_process_world.hpp"
+#include "services/world/link/objects_out.hpp"
 #include "services/world/link/robot_server.hpp"
 
 namespace jostle::world {
@@ -23,12 +24,13 @@ struct SimulatedWorldOptions {
   bool free_running = false;
 };
 
-/// A SimulatedWorld publishes joint states, object states, poses, transforms and its clock: all of them measurements,
-/// not truth.
+/// A SimulatedWorld publishes joint states and its clock, and tells how objects are seen: all of them measurements, not
+/// truth.
 class SimulatedWorld final : public Body {
  public:
+  /// `objects`: where it tells how objects are seen; outlives it.
   SimulatedWorld(const wire::Participant& participant, physics_pool::WorldPtr world,
-                 const SimulatedWorldOptions& options);
+                 const SimulatedWorldOptions& options, ObjectsOut& objects);
 
   std::vector<double> limits() const override;
   Result<void> begin(std::span<const double> u, double duration) override;
@@ -47,13 +49,9 @@ class SimulatedWorld final : public Body {
   long steps_ = 0, steps_left_ = 0;              // engine steps of the motion
   std::chrono::steady_clock::time_point began_;  // the motion
   bool moved_ = false;                           // a motion was begun
-  std::chrono::steady_clock::time_point next_transforms_;
-  double transforms_time_ = -1.0;  // world time of the newest transforms, s
 
+  ObjectsOut& objects_;
   wire::Writer<sensor_msgs::msg::JointState> joints_;
-  wire::Writer<jostle_msgs::msg::ObjectStates> objects_;
-  wire::Writer<geometry_msgs::msg::PoseArray> poses_;
-  wire::Writer<tf2_msgs::msg::TFMessage> transforms_;
   wire::Writer<rosgraph_msgs::msg::Clock> clock_;
 };
 

@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <memory>
 
 #include "physics_pool/uncertainty/belief.hpp"
 #include "physics_pool/uncertainty/levels.hpp"
@@ -17,7 +18,7 @@ int main(int argc, char** argv) {
   using namespace jostle;
   using namespace jostle::world;
   CLI::App app("Simulates the world in which actions happen.", "jostle sim");
-  std::string scene_file, belief_file, level = "none";
+  std::string scene_file, belief_file, level = "none", mocap;
   std::uint64_t seed = 0;
   SimulatedWorldOptions options;
   wire::ParticipantOptions participant_options{
@@ -36,6 +37,9 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
   app.add_flag("--free-running", options.free_running, "Go on between actions instead of standing still");
+  app.add_option("--mocap", mocap,
+                 "IPv4 address at which a simulated motion capture sees the objects (NatNet; `jostle perceive mocap`\n"
+                 "reads it); they are not published then (default: none)");
   common::add_process_options(app, process);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   common::die_with_parent(process.parent);
@@ -72,7 +76,15 @@ int main(int argc, char** argv) {
   if (!claim_result) return fail(claim_result.error());
 
   try {
-    SimulatedWorld world(*participant_result, *world_result, options);
+    std::unique_ptr<ObjectsOut> objects;
+    if (mocap.empty()) {
+      objects = std::make_unique<ObjectTopics>(*participant_result);
+    } else {
+      auto cameras_result = MocapCameras::start(mocap, physics_pool::layout_of(*scene_result));
+      if (!cameras_result) return fail(cameras_result.error());
+      objects = std::move(cameras_result).value();
+    }
+    SimulatedWorld world(*participant_result, *world_result, options, *objects);
     RobotServer server(*participant_result, world);
     spdlog::info("world '{}' of {} objects on domain {}, uncertainty {}", scene_result->name,
                  scene_result->objects.size(), participant_result->domain(), level);

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
+#include <optional>
 #include <thread>
 
 #include "robot_bridge/ur/dashboard.hpp"
@@ -18,11 +19,9 @@
 #include "robot_bridge/ur_sim/script_server.hpp"
 #include "services/common/process/command_line.hpp"
 #include "services/common/process/program.hpp"
-#include "services/wire/dds/topics.hpp"
-#include "services/wire/dds/writer.hpp"
 #include "services/world/arm/arm_scene.hpp"
 #include "services/world/in_process/in_process_world.hpp"
-#include "services/world/link/messages.hpp"
+#include "services/world/link/objects_out.hpp"
 #include "services/world/ur_sim/plant.hpp"
 
 namespace {
@@ -32,39 +31,29 @@ using namespace jostle::world;
 namespace ur_sim = robot_bridge::ur_sim;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kEyes = std::chrono::milliseconds(10);  // between two measurements of the objects
+constexpr auto kEyes = std::chrono::milliseconds(10);            // between two measurements of the objects
+constexpr auto kStandardForms = std::chrono::milliseconds(100);  // and between two as ROS 2's tools want them
 
 // What cameras would see of the objects, stamped with the time of day.
 class Eyes {
  public:
-  explicit Eyes(const wire::Participant& participant)
-      : objects_(participant, wire::topics::kObjectStates),
-        poses_(participant, wire::topics::kObjectPoses),
-        transforms_(participant, wire::topics::kTransforms) {}
+  explicit Eyes(ObjectsOut& objects) : objects_(objects) {}
 
   void look(const physics_pool::ExecutionWorld& world) {
     const auto now = Clock::now();
     if (now < next_) return;
     next_ = now + kEyes;
     const std::chrono::duration<double> time = std::chrono::system_clock::now().time_since_epoch();
-    const auto& layout = world.world().geometry().layout;
-    const auto message = to_message(object_readings(layout, world.state()), time.count());
-    (void)objects_.write(message);
-    if (++looks_ % 10 != 0) return;
-    (void)poses_.write(pose_array_message(message));
-    (void)transforms_.write(transform_message(message));
+    objects_.tell(object_readings(world.world().geometry().layout, world.state()), time.count());
   }
 
  private:
   Clock::time_point next_{};
-  long looks_ = 0;
-  wire::Writer<jostle_msgs::msg::ObjectStates> objects_;
-  wire::Writer<geometry_msgs::msg::PoseArray> poses_;
-  wire::Writer<tf2_msgs::msg::TFMessage> transforms_;
+  ObjectsOut& objects_;
 };
 
 struct Options {
-  std::string scene_file, address = "127.0.0.1", generation = "cb3";
+  std::string scene_file, address = "127.0.0.1", generation = "cb3", mocap;
   bool has_eyes = true;
   std::uint16_t pendant = 0;  // port; 0: none
 };
@@ -104,6 +93,8 @@ class Machine {
     pendant_ = std::move(pendant).value();
     return {};
   }
+
+  const StateLayout& layout() { return plant_.world().world().geometry().layout; }
 
   // In real time. A machine that is too slow makes the arm slow, not jumpy: time that was missed is not made up for.
   Result<void> run(Eyes* eyes, std::stop_token stop) {
@@ -173,7 +164,12 @@ int main(int argc, char** argv) {
   app.add_option(
       "--pendant", options.pendant,
       "Port that takes lines: protective stop, emergency stop, restart safety, reboot, remote, local (default: none)");
-  app.add_flag("!--no-eyes", options.has_eyes, "Do not publish where the objects are");
+  auto* no_eyes = app.add_flag("!--no-eyes", options.has_eyes, "Do not publish where the objects are");
+  app.add_option(
+         "--mocap", options.mocap,
+         "IPv4 address at which a simulated motion capture sees the objects, instead of publishing where they are "
+         "(NatNet; `jostle perceive mocap` reads it)")
+      ->excludes(no_eyes);
   common::add_process_options(app, process);
   app.footer(
       "Ports: 29999 dashboard, 30001 primary, 30002 secondary, 30004 RTDE, 63352 gripper.\n"
@@ -200,16 +196,22 @@ int main(int argc, char** argv) {
   if (auto ok = machine.listen(options.address, options.pendant); !ok) return fail(ok.error());
   try {
     std::optional<wire::Participant> participant;
-    std::unique_ptr<Eyes> eyes;
-    if (options.has_eyes) {
+    std::unique_ptr<ObjectsOut> objects;
+    if (!options.mocap.empty()) {
+      auto cameras_result = MocapCameras::start(options.mocap, machine.layout());
+      if (!cameras_result) return fail(cameras_result.error());
+      objects = std::move(cameras_result).value();
+    } else if (options.has_eyes) {
       auto participant_result = wire::Participant::open(
           {.name = "jostle_ur_sim", .domain = process.domain, .role = wire::Role::kRobot, .waits_for_server = true});
       if (!participant_result) return fail(participant_result.error());
       participant.emplace(*participant_result);
-      eyes = std::make_unique<Eyes>(*participant);
+      objects = std::make_unique<ObjectTopics>(*participant, kStandardForms);
     }
+    std::optional<Eyes> eyes;
+    if (objects) eyes.emplace(*objects);
     spdlog::info("{} ready at {}: scene '{}'", kind.model, options.address, scene_result->name);
-    if (auto ok = machine.run(eyes.get(), signal.token()); !ok) return fail(ok.error());
+    if (auto ok = machine.run(eyes ? &*eyes : nullptr, signal.token()); !ok) return fail(ok.error());
     return common::kExitOk;
   } catch (const wire::SetupError& error) {
     return fail({Code::kUnavailable, error.what()});

@@ -1,0 +1,60 @@
+#pragma once
+/// \file
+/// Where measurements of objects go: topics, or a simulated motion capture.
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "idl/types/state.hpp"
+#include "perception/api/object_source.hpp"
+#include "perception/natnet/server.hpp"
+#include "services/wire/dds/participant.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/writer.hpp"
+
+namespace jostle::world {
+
+/// Takes measurements for whoever wants to know. Threads  one.
+class ObjectsOut {
+ public:
+  virtual ~ObjectsOut() = default;
+  /// `time`: s of the clock that stamps are of.
+  virtual void tell(const std::vector<perception::ObjectReading>& objects, double time) = 0;
+};
+
+/// Publishes states, and in standard forms poses and transforms.
+class ObjectTopics final : public ObjectsOut {
+ public:
+  /// `pause`: between two messages of the standard forms, by the wall clock.
+  explicit ObjectTopics(const wire::Participant& participant, std::chrono::milliseconds pause = {});
+  void tell(const std::vector<perception::ObjectReading>& objects, double time) override;
+
+ private:
+  const std::chrono::milliseconds pause_;
+  std::chrono::steady_clock::time_point next_{}, next_transforms_{};
+  double transforms_time_ = -1.0;  // of the newest transforms, s
+  wire::Writer<jostle_msgs::msg::ObjectStates> states_;
+  wire::Writer<geometry_msgs::msg::PoseArray> poses_;
+  wire::Writer<tf2_msgs::msg::TFMessage> transforms_;
+};
+
+/// Cameras of a simulated motion capture: each object is a rigid body of its name, seen without error, and `jostle
+/// perceive mocap` reads them. The frames' timestamps are the times that tell() is given.
+class MocapCameras final : public ObjectsOut {
+ public:
+  /// `address`: IPv4 of this host, on whose NatNet ports they serve. `layout`: has the objects.
+  /// Error kUnavailable: the port is taken.
+  static Result<std::unique_ptr<MocapCameras>> start(const std::string& address, const StateLayout& layout);
+  void tell(const std::vector<perception::ObjectReading>& objects, double time) override;
+
+ private:
+  MocapCameras(std::unique_ptr<perception::natnet::Server> server, std::vector<std::string> names)
+      : server_(std::move(server)), names_(std::move(names)) {}
+
+  std::unique_ptr<perception::natnet::Server> server_;
+  const std::vector<std::string> names_;  // the id of a body is its place here, from 1
+};
+
+}  // namespace jostle::world

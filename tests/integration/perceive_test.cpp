@@ -1,0 +1,63 @@
+// Objects that are seen by a motion capture: the simulated world tells its cameras alone, they speak NatNet, and what
+// reads them publishes. All of them processes of their own.
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/run_fixture.hpp"
+
+namespace jostle::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Perceive : public RunFixture, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(Perceive, RunGraspsWhatMotionCaptureSeesAndReplaysBitEqual) {
+  const std::string bag = folder.path() / "bag", report = folder.path() / "run.json";
+  const int code = finish({easy, "--arm", GetParam(), "--objects", "mocap-sim", "--workers", "2", "--parameters", plain,
+                           "--record", bag, "--json", report});
+
+  ASSERT_EQ(code, 0) << run->err();
+  const auto result = nlohmann::json::parse(contents(report));
+  EXPECT_TRUE(result["success"]);
+  EXPECT_GT(result["actions"], 1);
+  const auto replay = program("jostle_replay", {bag});
+  EXPECT_EQ(replay->wait(kPatience), 0) << replay->out() << replay->err();
+  EXPECT_THAT(replay->out(), HasSubstr("BIT-EQUAL"));
+}
+INSTANTIATE_TEST_SUITE_P(, Perceive, ::testing::Values("sim", "ur-sim"),
+                         [](const auto& arm) { return std::string(arm.param) == "sim" ? "ByHand" : "ByArm"; });
+
+class PerceiveTrouble : public RunFixture {};
+
+TEST_F(PerceiveTrouble, EyesThatAreGoneEndTheRunByTheirName) {
+  start({easy, "--objects", "mocap-sim", "--workers", "2", "--parameters", endless});
+  ASSERT_TRUE(searches()) << run->err();
+  const pid_t eyes = run->child("jostle_perceive");
+  ASSERT_GT(eyes, 0);
+
+  kill(eyes, SIGKILL);
+
+  EXPECT_EQ(run->wait(kPatience), 3);
+  EXPECT_THAT(run->err(), HasSubstr("the eyes ended: killed by signal 9"));
+}
+
+TEST_F(PerceiveTrouble, NobodyThereIsSaid) {
+  const auto sut = program("jostle_perceive", {"mocap", "--host", "127.0.7.7"});
+  EXPECT_TRUE(sut->says("waiting: 127.0.7.7:1510: no answer so far", kPatience)) << sut->err();
+  sut->signal(SIGTERM);
+  EXPECT_EQ(sut->wait(kPatience), 0);
+  EXPECT_THAT(sut->err(), HasSubstr("0 frames"));
+}
+
+TEST_F(PerceiveTrouble, WhatIsNoSensorIsRefused) {
+  EXPECT_EQ(finish({easy, "--objects", "eyes"}), 2);
+  EXPECT_THAT(run->err(), HasSubstr("wanted sim, mocap-sim or mocap:HOST"));
+  EXPECT_EQ(finish({easy, "--objects", "mocap:10.0.0.1"}), 2);
+  EXPECT_THAT(run->err(), HasSubstr("the arm's world is simulated"));
+}
+
+}  // namespace
+}  // namespace jostle::tests

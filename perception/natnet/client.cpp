@@ -122,7 +122,11 @@ class Client::Impl {
       if (is_due(echoed_, echoes_.size() < kEchoes ? Clock::duration(kTick) : Clock::duration(kKeepAlive), now))
         ask_echo(now);
       if (options_.version && !has_version_ && is_due(version_asked_, kAskAgain, now)) ask_version();
-      if (now - framed_ > kNoFrames) say(why_no_frames());
+      if (now - framed_ > kNoFrames) {
+        say(why_no_frames());
+        // A server that started anew answers echoes, and knows nothing of us.
+        if (is_due(introduced_, kNoFrames, now)) send(MessageId::kConnect, introduction());
+      }
     }
     timer_.expires_after(kTick);
     timer_.async_wait([this](const boost::system::error_code& error) {
@@ -308,7 +312,7 @@ class Client::Impl {
   std::map<std::int32_t, std::string> names_;
   std::deque<Echo> echoes_;
   std::int64_t number_ = 0;  // of the newest frame
-  Clock::time_point heard_{}, framed_{}, asked_{}, kept_alive_{}, echoed_{}, version_asked_{};
+  Clock::time_point heard_{}, framed_{}, asked_{}, kept_alive_{}, echoed_{}, version_asked_{}, introduced_{};
 
   mutable std::mutex mutex_;  // guards trouble_ and counts_
   std::string trouble_;

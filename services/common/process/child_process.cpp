@@ -2,13 +2,13 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <deque>
@@ -77,14 +77,14 @@ Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept
     : pid_(std::exchange(other.pid_, -1)),
       log_(std::move(other.log_)),
-      ended_(std::move(other.ended_)),
+      ended_(other.ended_),
       told_(other.told_) {}
 
 ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
   end();
   pid_ = std::exchange(other.pid_, -1);
   log_ = std::move(other.log_);
-  ended_ = std::move(other.ended_);
+  ended_ = other.ended_;
   told_ = other.told_;
   return *this;
 }

@@ -91,6 +91,7 @@ std::map<std::string, std::uint64_t> apportion(const Shares& shares, std::uint64
   std::uint64_t sum = 0, given = 0;
   for (const auto& [id, share] : shares) sum += share.rollouts;
   std::map<std::string, std::uint64_t> result;
+  if (sum == 0) return result;
   std::vector<std::pair<std::uint64_t, std::string>> remainders;
   for (const auto& [id, share] : shares) {
     const std::uint64_t product = rollouts * share.rollouts;

@@ -198,7 +198,7 @@ Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::Goa
   report["changed_parameters"] = changes_of(options);
   report["layout"] = layout(options.scene);
   print_summary(options, report);
-  const auto drawn = options.picture.empty() ? Result<void>() : draw(options, report);
+  auto drawn = options.picture.empty() ? Result<void>() : draw(options, report);
   if (!options.json.empty()) {
     if (auto ok = common::write_results(options.json, report); !ok) return ok;
     fmt::print(summary_of(options), "  numbers      {}\n", options.json.string());

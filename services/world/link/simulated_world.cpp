@@ -13,7 +13,7 @@ using std::chrono::steady_clock;
 
 }  // namespace
 
-SimulatedWorld::SimulatedWorld(const wire::Participant& participant, physics_pool::WorldPtr world,
+SimulatedWorld::SimulatedWorld(const wire::Participant& participant, const physics_pool::WorldPtr& world,
                                const SimulatedWorldOptions& options, ObjectsOut& objects)
     : options_(options),
       world_(world, options.noise),

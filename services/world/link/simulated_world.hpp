@@ -29,7 +29,7 @@ struct SimulatedWorldOptions {
 class SimulatedWorld final : public Body {
  public:
   /// `objects`: where it tells how objects are seen; outlives it.
-  SimulatedWorld(const wire::Participant& participant, physics_pool::WorldPtr world,
+  SimulatedWorld(const wire::Participant& participant, const physics_pool::WorldPtr& world,
                  const SimulatedWorldOptions& options, ObjectsOut& objects);
 
   std::vector<double> limits() const override;

@@ -248,7 +248,7 @@ class Client::Impl {
     const auto sent = Clock::time_point(Clock::duration(static_cast<Clock::rep>(in.get<std::uint64_t>())));
     const auto ticks = in.get<std::uint64_t>();
     const auto now = Clock::now();
-    if (!in.done() || sent > now || now - sent > kGone) return drop();
+    if (!in.done() || sent > now || sent < now - kGone) return drop();
     echoes_.push_back({.middle = sent + (now - sent) / 2, .ticks = ticks, .round_trip = now - sent});
     if (echoes_.size() > kEchoes) echoes_.pop_front();
     const std::lock_guard lock(mutex_);

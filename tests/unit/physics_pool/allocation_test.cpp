@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "physics_pool/coarse/quasi_static_clutter.hpp"
 #include "physics_pool/local/engine.hpp"
 #include "physics_pool/local/reduced_simulator.hpp"
 #include "physics_pool/local/simulator.hpp"
@@ -71,6 +72,19 @@ TEST_F(AllocationTest, AdvanceAllocatesNothingAfterConstruction) {
   for (int i = 0; i < 10; ++i) (void)sut.advance(x, u, 100);
   EXPECT_EQ(allocations, before);
   EXPECT_NE(x, start);
+}
+
+TEST_F(AllocationTest, CoarseAdvanceAllocatesNothingAfterConstruction) {
+  Scene scene = tests::three_objects();
+  scene.robot.q[0] = -0.15;
+  QuasiStaticClutter sut = std::move(QuasiStaticClutter::make(scene)).value();
+  const State start = initial_state(scene);
+  State x = start;
+  const std::array<double, 4> u{0.1, 0.05, 0.2, -0.01};
+  const long before = allocations;
+  for (int i = 0; i < 10; ++i) sut.advance(x, u, 0.2);
+  EXPECT_EQ(allocations, before);
+  EXPECT_NE(x.q[5], start.q[5]);  // the target was pushed
 }
 
 TEST_F(AllocationTest, AdvanceWithFrozenObjectsAllocatesNothingOnceItsModelsExist) {

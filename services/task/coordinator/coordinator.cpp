@@ -26,7 +26,7 @@ using std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kFeedbackPeriod{100};
 constexpr std::size_t kGoalQueue = 8;
 constexpr std::chrono::milliseconds kLastWords{300};  // for readers to receive what was written
-constexpr std::chrono::seconds kAnswerPatience{2};  // for the middleware to take a result
+constexpr std::chrono::seconds kAnswerPatience{2};    // for the middleware to take a result
 constexpr std::chrono::milliseconds kAnswerPause{50};
 
 const char* word(planners::Phase phase) {

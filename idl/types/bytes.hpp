@@ -39,6 +39,10 @@ class ByteWriter {
     for (const T value : values) put(value);
     return *this;
   }
+  ByteWriter& put(std::span<const std::uint8_t> bytes) {
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+    return *this;
+  }
   /// Appends the characters alone, neither a length nor an end.
   ByteWriter& put(std::string_view text) {
     bytes_.insert(bytes_.end(), text.begin(), text.end());
@@ -86,6 +90,16 @@ class ByteReader {
     std::string text(left_.begin(), left_.begin() + static_cast<std::ptrdiff_t>(size));
     left_ = left_.subspan(size);
     return text;
+  }
+  void skip(std::size_t size) {
+    if (has(size)) left_ = left_.subspan(size);
+  }
+  /// Returns a reader of the next `size` bytes alone, and goes on behind them.
+  ByteReader part(std::size_t size) {
+    if (!has(size)) return ByteReader({});
+    ByteReader reader(left_.first(size));
+    left_ = left_.subspan(size);
+    return reader;
   }
   /// Reads everything that is left as text.
   std::string get_rest() { return get_text(left_.size()); }

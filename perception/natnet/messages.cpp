@@ -38,8 +38,6 @@ std::string text(Reader& in) {
   return result;
 }
 
-void skip(Reader& in, std::size_t bytes) { (void)in.get_text(bytes); }
-
 // Reads `count` items of at least `least` bytes each; stops where there are too few for them.
 bool each(Reader& in, std::int32_t count, std::size_t least, const std::function<void()>& read) {
   if (count < 0 || static_cast<std::size_t>(count) > in.left() / least) return false;
@@ -53,8 +51,7 @@ bool section(Reader& in, Version version, std::size_t least, const std::function
   if (version < kSized) return each(in, count, least, [&] { item(in); });
   const auto size = in.get<std::int32_t>();
   if (!in.ok() || size < 0 || static_cast<std::size_t>(size) > in.left()) return false;
-  const std::string bytes = in.get_text(static_cast<std::size_t>(size));
-  Reader inner(std::span(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()));
+  Reader inner = in.part(static_cast<std::size_t>(size));
   return each(inner, count, least, [&] { item(inner); });
 }
 
@@ -62,7 +59,7 @@ constexpr std::size_t kPoint = 12, kBody = 4 + 12 + 16 + 4 + 2, kMarker = 4 + 12
 
 void pass_point_set(Reader& in) {
   (void)text(in);
-  (void)each(in, in.get<std::int32_t>(), kPoint, [&] { skip(in, kPoint); });
+  (void)each(in, in.get<std::int32_t>(), kPoint, [&] { in.skip(kPoint); });
 }
 
 Body body(Reader& in) {
@@ -102,7 +99,7 @@ bool is_pose(const Body& body) {
 void put_section(Writer& out, Version version, std::size_t count, const Bytes& items) {
   out.put(static_cast<std::int32_t>(count));
   if (version >= kSized) out.put(static_cast<std::int32_t>(items.size()));
-  for (const std::uint8_t byte : items) out.put(byte);
+  out.put(std::span(items));
 }
 
 void put_text(Writer& out, const std::string& text) { out.put(std::string_view(text)).put(std::uint8_t{0}); }
@@ -112,7 +109,7 @@ void put_text(Writer& out, const std::string& text) { out.put(std::string_view(t
 Bytes encode(const Message& message) {
   Writer out;
   out.put(static_cast<std::uint16_t>(message.id)).put(static_cast<std::uint16_t>(message.payload.size()));
-  for (const std::uint8_t byte : message.payload) out.put(byte);
+  out.put(std::span(message.payload));
   return out.take();
 }
 
@@ -185,18 +182,18 @@ Result<Frame> decode_frame(std::span<const std::uint8_t> payload, Version versio
   Frame frame;
   frame.number = in.get<std::int32_t>();
   if (!section(in, version, 5, pass_point_set)) return cut("frame: marker sets");
-  if (!section(in, version, kPoint, [](Reader& from) { skip(from, kPoint); })) return cut("frame: other markers");
+  if (!section(in, version, kPoint, [](Reader& from) { from.skip(kPoint); })) return cut("frame: other markers");
   if (!section(in, version, kBody, [&](Reader& from) { frame.bodies.push_back(body(from)); })) {
     return cut("frame: rigid bodies");
   }
   const auto pass_bodies = [](Reader& from) {
     (void)from.get<std::int32_t>();
-    (void)each(from, from.get<std::int32_t>(), kBody, [&] { skip(from, kBody); });
+    (void)each(from, from.get<std::int32_t>(), kBody, [&] { from.skip(kBody); });
   };
   if (!section(in, version, 8, pass_bodies)) return cut("frame: skeletons");
   const auto pass_asset = [&](Reader& from) {
     pass_bodies(from);
-    (void)each(from, from.get<std::int32_t>(), kMarker, [&] { skip(from, kMarker); });
+    (void)each(from, from.get<std::int32_t>(), kMarker, [&] { from.skip(kMarker); });
   };
   if (version >= kSized && !section(in, version, 12, pass_asset)) return cut("frame: assets");
   if (!section(in, version, kMarker, [&](Reader& from) { frame.markers.push_back(marker(from)); })) {
@@ -204,12 +201,12 @@ Result<Frame> decode_frame(std::span<const std::uint8_t> payload, Version versio
   }
   if (!section(in, version, 8, pass_channels)) return cut("frame: force plates");
   if (!section(in, version, 8, pass_channels)) return cut("frame: devices");
-  skip(in, 8);  // time code
+  in.skip(8);  // time code
   frame.timestamp = in.get<double>();
   frame.mid_exposure = in.get<std::uint64_t>();
   frame.received = in.get<std::uint64_t>();
   frame.sent = in.get<std::uint64_t>();
-  if (version >= kSized) skip(in, 8);
+  if (version >= kSized) in.skip(8);
   frame.models_changed = (in.get<std::int16_t>() & kModelsChanged) != 0;
   (void)in.get<std::int32_t>();
   if (!in.ok()) return cut("frame");
@@ -230,7 +227,7 @@ Bytes encode(const std::vector<Model>& models, Version version) {
     one.put(model.id).put(std::int32_t{-1}).put(std::array<float, 3>{}).put(std::int32_t{0});  // no parent, no markers
     out.put(std::int32_t{kRigidBody});
     if (version >= kSized) out.put(static_cast<std::int32_t>(one.bytes().size()));
-    for (const std::uint8_t byte : one.bytes()) out.put(byte);
+    out.put(std::span(one.bytes()));
   }
   return out.take();
 }
@@ -241,10 +238,10 @@ Model rigid_body(Reader& in, Version version) {
   Model model;
   model.name = text(in);
   model.id = in.get<std::int32_t>();
-  skip(in, 4 + kPoint);  // parent, offset
+  in.skip(4 + kPoint);  // parent, offset
   const auto markers = in.get<std::int32_t>();
-  (void)each(in, markers, kPoint, [&] { skip(in, kPoint); });
-  (void)each(in, markers, 4, [&] { skip(in, 4); });
+  (void)each(in, markers, kPoint, [&] { in.skip(kPoint); });
+  (void)each(in, markers, 4, [&] { in.skip(4); });
   if (version >= kMarkerNames) (void)each(in, markers, 1, [&] { (void)text(in); });
   return model;
 }
@@ -263,7 +260,7 @@ bool pass_model(Reader& in, std::int32_t kind, Version version) {
       return true;
     case kCamera:
       (void)text(in);
-      skip(in, 7 * 4);
+      in.skip(7 * 4);
       return true;
     default:
       return false;
@@ -282,8 +279,7 @@ Result<std::vector<Model>> decode_models(std::span<const std::uint8_t> payload, 
     if (version >= kSized) {
       const auto size = in.get<std::int32_t>();
       if (!in.ok() || size < 0 || static_cast<std::size_t>(size) > in.left()) return cut("models");
-      const std::string bytes = in.get_text(static_cast<std::size_t>(size));
-      Reader inner(std::span(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()));
+      Reader inner = in.part(static_cast<std::size_t>(size));
       if (kind == kRigidBody) models.push_back(rigid_body(inner, version));
       if (!inner.ok()) return cut("models: rigid body");
     } else if (kind == kRigidBody) {

@@ -307,7 +307,7 @@ void QuasiStaticClutter::find_contacts() {
 void QuasiStaticClutter::touch(int a, int b, int piece, const Touches& touches) {
   for (int t = 0; t < touches.count && contacts_.size() < contacts_.capacity(); ++t) {
     const Touch& at = touches.values[index(t)];
-    Contact2 contact;
+    Pressing contact;
     contact.a = a;
     contact.b = a >= 0 && b >= 0 ? b : -1;
     contact.robot = piece < 0 ? 0.0 : a < 0 ? 1.0 : -1.0;
@@ -331,7 +331,7 @@ void QuasiStaticClutter::touch(int a, int b, int piece, const Touches& touches) 
         contact.jr[row][j] = contact.robot * along;
       }
     }
-    for (const Contact2& old : before_) {
+    for (const Pressing& old : before_) {
       if (old.key != contact.key) continue;
       contact.normal_force = old.normal_force;
       contact.tangent_force = old.tangent_force;
@@ -391,7 +391,7 @@ void QuasiStaticClutter::prepare() {
     object.w = 0.0;
   }
   for (std::size_t j = 0; j < drives_.size(); ++j) v_[j] = free_[j] + drives_[j].yield * held_[j];
-  for (Contact2& contact : contacts_) {
+  for (Pressing& contact : contacts_) {
     for (std::size_t row = 0; row < 2; ++row) {
       double sum = 0.0;
       for (std::size_t k = 0; k < 3; ++k) {
@@ -419,7 +419,7 @@ void QuasiStaticClutter::sweep(double h) {
     v_[j] += drive.yield * (force - held_[j]);
     held_[j] = force;
   }
-  for (Contact2& contact : contacts_) {
+  for (Pressing& contact : contacts_) {
     const double fn =
         std::max(0.0, contact.normal_force + (contact.target / h - relative(contact, 0)) * contact.inverse[0]);
     push(contact, 0, fn - contact.normal_force);
@@ -431,7 +431,7 @@ void QuasiStaticClutter::sweep(double h) {
   }
 }
 
-double QuasiStaticClutter::relative(const Contact2& contact, std::size_t row) const {
+double QuasiStaticClutter::relative(const Pressing& contact, std::size_t row) const {
   double sum = 0.0;
   const auto add = [&](int i, const std::array<double, 3>& j) {
     if (i < 0) return;
@@ -446,7 +446,7 @@ double QuasiStaticClutter::relative(const Contact2& contact, std::size_t row) co
   return sum;
 }
 
-void QuasiStaticClutter::push(const Contact2& contact, std::size_t row, double force) {
+void QuasiStaticClutter::push(const Pressing& contact, std::size_t row, double force) {
   const auto add = [&](int i, const std::array<double, 3>& j) {
     if (i < 0) return;
     Motion& object = objects_[index(i)];

@@ -58,9 +58,6 @@ class QuasiStaticClutter {
   ///          nothing drives, a mesh, a tilted box; says which
   static Result<QuasiStaticClutter> make(const Scene& scene, const ClutterOptions& options = {});
 
-  /// Sets what is fitted; the scene stays.
-  void set_options(const ClutterOptions& options) { options_ = options; }
-
   /// Moves x by one control step: a pure function of its arguments. Heights and tilts stay as they are, but for objects
   /// that leave the surface, which fall below it and out of the way. `v` becomes the last substep's velocities.
   /// `u` [nu], m/s and rad/s, `duration` in s. x has the sizes of the scene's states. Numbers that are not finite stay
@@ -109,7 +106,7 @@ class QuasiStaticClutter {
     std::vector<int> joints;
     std::uint32_t chain = 0;  // joints that move it
   };
-  struct Contact2 {
+  struct Pressing {      // of one body on another, at a point
     int a = -1, b = -1;  // objects, or -1
     int key = 0;         // names the pair and the point
     double robot = 0.0;  // +1, -1: the robot is a, b; 0: it is neither
@@ -132,8 +129,8 @@ class QuasiStaticClutter {
   void weigh();
   void prepare();
   void sweep(double h);
-  double relative(const Contact2& contact, std::size_t row) const;
-  void push(const Contact2& contact, std::size_t row, double force);
+  double relative(const Pressing& contact, std::size_t row) const;
+  void push(const Pressing& contact, std::size_t row, double force);
   void integrate(double h);
 
   ClutterOptions options_;
@@ -150,7 +147,7 @@ class QuasiStaticClutter {
   std::vector<PlanarPose> link_poses_;
   std::array<double, kMostJoints> q_{}, v_{}, free_{}, held_{};  // joints; held_: force of the limit they are at
   std::array<Eigen::Vector2d, kMostJoints> arrows_{};            // of a slide: its direction; of a hinge: its place
-  std::vector<Contact2> contacts_, before_;
+  std::vector<Pressing> contacts_, before_;
   std::vector<int> queue_;
   double margin_ = 0.0, approach_ = 0.0, h_ = 0.0;
 };

@@ -117,19 +117,23 @@ Result<void> Execution::move(std::span<const double> u, Phase phase) {
 
 Result<Outcome> Execution::end(const Result<void>& ended) {
   outcome_.total_time = Clock::now() - start_;
-  const Code code = ended ? Code::kInternal : ended.error().code;
-  if (!ended && code == Code::kDeadline) {
-    outcome_.conclude(Ending::kTimedOut, is_out_of_rollouts_
-                                             ? fmt::format("all {} rollouts are spent", setup_.limits.rollouts)
-                                             : fmt::format("timeout after {:.0f} s", outcome_.total_time.count()));
-  } else if (!ended && code == Code::kCancelled) {
-    outcome_.conclude(Ending::kCancelled, "cancelled");
-  } else if (!ended) {
-    outcome_.conclude(Ending::kBroken, ended.error().message);
-  }
+  if (!ended) conclude_early(ended.error());
   notify(Phase::kDone);
-  if (!ended && code != Code::kDeadline) return ended.error();
-  return std::move(outcome_);
+  if (ended || ended.error().code == Code::kDeadline) return std::move(outcome_);
+  return ended.error();
+}
+
+void Execution::conclude_early(const Error& why) {
+  switch (why.code) {
+    case Code::kDeadline:
+      return outcome_.conclude(
+          Ending::kTimedOut, is_out_of_rollouts_ ? fmt::format("all {} rollouts are spent", setup_.limits.rollouts)
+                                                 : fmt::format("timeout after {:.0f} s", outcome_.total_time.count()));
+    case Code::kCancelled:
+      return outcome_.conclude(Ending::kCancelled, "cancelled");
+    default:
+      return outcome_.conclude(Ending::kBroken, why.message);
+  }
 }
 
 std::uint64_t Execution::rollouts_left() const {

@@ -133,6 +133,7 @@ class Execution {
 
  private:
   std::uint64_t rollouts_left() const;
+  void conclude_early(const Error& why);
 
   using Clock = std::chrono::steady_clock;
 

@@ -3,7 +3,6 @@
 /// Our programs as a user starts them: arguments in, exit code and words out.
 
 #include <fcntl.h>
-#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -21,21 +20,10 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/soon.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace jostle::tests {
-
-/// Whether a condition came true within `patience`. Pauses between two looks:
-/// who looks all the time takes a core from what is waited for.
-inline bool soon(std::chrono::milliseconds patience, const std::function<bool()>& condition) {
-  constexpr int kPause = 5;  // ms, well below anything measured here
-  const auto deadline = std::chrono::steady_clock::now() + patience;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() >= deadline) return false;
-    poll(nullptr, 0, kPause);
-  }
-  return true;
-}
 
 /// One process as /proc shows it.
 struct ProcessEntry {

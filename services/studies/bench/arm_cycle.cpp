@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 #include <unistd.h>
-
 #include <algorithm>
-#include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <mutex>
@@ -13,15 +11,14 @@
 #include <utility>
 #include <vector>
 
-#include "physics_pool/scene/scene.hpp"
 #include "robot_bridge/net/tcp_client.hpp"
 #include "robot_bridge/net/tcp_server.hpp"
 #include "robot_bridge/ur/planar_arm.hpp"
 #include "robot_bridge/ur/rtde.hpp"
-#include "services/common/process/child_process.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
 #include "services/studies/bench/benchmarks.hpp"
+#include "services/studies/bench/swarm.hpp"
 #include "services/studies/bench/workload.hpp"
 
 namespace jostle::studies {
@@ -241,19 +238,18 @@ class Tally {
 
 Result<Measurement> measure_generation(const std::string& generation, int rate, const Settings& settings) {
   const std::string address = fmt::format("127.0.4.{}", settings.domain + 1);
-  auto folder_result = common::make_temporary_folder("arm-cycle");
-  if (!folder_result) return folder_result.error();
-  auto arm_result = common::ChildProcess::start(
-      common::program_folder() / "jostle_ur_sim",
-      {common::data_file("scenes/clutter.yaml").string(), "--address", address, "--controller", generation, "--domain",
-       std::to_string(settings.domain), "--no-eyes", "--die-with-parent", std::to_string(getpid())},
-      *folder_result / "ur_sim.log");
-  if (!arm_result) return arm_result.error();
+  Helpers helpers(settings.domain, {});
+  if (auto ok = helpers.start("jostle_ur_sim",
+                              {common::data_file("scenes/clutter.yaml").string(), "--address", address, "--controller",
+                               generation, "--no-eyes", "--die-with-parent", std::to_string(getpid())});
+      !ok)
+    return ok.error();
   const auto deadline = Clock::now() + kReady;
   while (!net::TcpClient::connect(address, rtde::kPort, Clock::now() + 1s)) {
-    if (Clock::now() > deadline || arm_result->ended())
-      return Error{Code::kUnavailable, "arm-cycle: no controller:\n" + arm_result->last_words()};
-    common::pause_until(Clock::now() + 50ms, settings.stop);
+    const std::string casualty = helpers.casualty();
+    if (Clock::now() > deadline || !casualty.empty())
+      return Error{Code::kUnavailable, "arm-cycle: no controller " + casualty};
+    if (!common::pause_until(Clock::now() + 50ms, settings.stop)) return Error{Code::kCancelled, "interrupted"};
   }
   auto relay_result = Relay::start(address);
   if (!relay_result) return relay_result.error();
@@ -261,8 +257,6 @@ Result<Measurement> measure_generation(const std::string& generation, int rate, 
   auto result = compare({"client", [&] { return client.run(use_client, address, **relay_result, settings.stop); }},
                         {"bare loop", [&] { return bare.run(use_bare_loop, address, **relay_result, settings.stop); }},
                         settings.turns());
-  std::error_code ignored;
-  std::filesystem::remove_all(*folder_result, ignored);
   if (!result) return result.error();
   result->name = fmt::format("arm-cycle/{}-hz", rate);
   result->unit = "us";

@@ -33,12 +33,13 @@ std::string Display::text(const jostle_msgs::msg::Feedback& feedback) {
     total += rate;
     workers.push_back({fmt::format("{}:{:.1f}", report.name(), rate), kWorkerRank + static_cast<int>(workers.size())});
   }
-  const bool has_rollouts = feedback.rollouts() > 0;  // before them there is no cost
-  const bool has_state = feedback.target_distance() > 0.0;
+  const auto number = [](bool known, double value) { return known ? fmt::format("{:.1f}", value) : "-"; };
+  const std::string cost = number(feedback.rollouts() > 0, feedback.cost());  // before rollouts there is none
+  const std::string distance = number(feedback.target_distance() > 0.0, 100 * feedback.target_distance());
   std::vector<common::LinePart> parts{
       {fmt::format("{:5.1f} s  {:<9} iteration {:>2}", feedback.elapsed(), feedback.phase(), feedback.iteration()), 0},
-      {has_rollouts ? fmt::format("cost {:>8.1f}", feedback.cost()) : "cost        -", 4},
-      {has_state ? fmt::format("target {:>5.1f} cm", 100 * feedback.target_distance()) : "target     - cm", 1},
+      {fmt::format("cost {:>8}", cost), 4},
+      {fmt::format("target {:>5} cm", distance), 1},
       {fmt::format("actions {:>2}", feedback.actions()), 5},
       {fmt::format("re-plans {:>2}", feedback.replans()), 2},
       {fmt::format("{:.1f} {}/s", total, feedback.unit()), 3}};

@@ -90,8 +90,9 @@ int perform(const RunOptions& options, double patience, std::stop_token stop) {
   line.finish();
   if (!result) return fail(result.error(), code_of(result.error()));
   if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), common::kExitBroken);
-  if (const std::string error = error_of(*result); !error.empty()) (void)fail({Code::kUnavailable, error}, 0);
-  return exit_code_of(*result);
+  const int code = exit_code_of(*result);
+  const std::string error = error_of(*result);
+  return error.empty() ? code : fail({Code::kUnavailable, error}, code);
 }
 
 }  // namespace

@@ -40,8 +40,9 @@ int perform(const RunOptions& options, std::stop_token stop) {
   session_result->reset();  // before drawing: every process it started is gone
   if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), common::kExitBroken);
   if (!recorded) return fail(recorded.error(), common::kExitBroken);
-  if (const std::string error = error_of(*result); !error.empty()) (void)fail({Code::kUnavailable, error}, 0);
-  return exit_code_of(*result);
+  const int code = exit_code_of(*result);
+  const std::string error = error_of(*result);
+  return error.empty() ? code : fail({Code::kUnavailable, error}, code);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "physics_pool/scene/task_kind.hpp"
+#include "planners/execution/execution.hpp"
 #include "services/common/process/child_process.hpp"
 #include "services/common/process/exit_codes.hpp"
 #include "services/common/process/files.hpp"
@@ -120,17 +121,23 @@ Result<void> draw(const RunOptions& options, const json& report) {
   return drawn;
 }
 
-const char* headline(std::uint8_t ending) {
+// How an ending is told: to people, and to whoever started the program.
+struct Told {
+  const char* headline;
+  common::ExitCode code;
+};
+
+Told told(std::uint8_t ending) {
   switch (ending) {
     case endings::SUCCEEDED:
-      return "SUCCESS";
+      return {"SUCCESS", common::kExitOk};
     case endings::CANCELLED:
-      return "CANCELLED";
+      return {"CANCELLED", common::kExitInterrupted};
     case endings::BROKEN:
     case endings::REFUSED:
-      return "BROKEN";
+      return {"BROKEN", common::kExitBroken};
     default:
-      return "FAILURE";
+      return {"FAILURE", common::kExitFailed};
   }
 }
 
@@ -176,14 +183,14 @@ std::string error_of(const jostle_msgs::msg::GoalResult& result) {
 Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::GoalResult& result) {
   std::FILE* out = summary_of(options);
   if (result.report().empty() && !result.error().empty()) return {};
-  fmt::print(out, "\n{}: {}\n", headline(result.ending()), result.reason());
+  fmt::print(out, "\n{}: {}\n", told(result.ending()).headline, result.reason());
   json report = json::parse(result.report(), nullptr, false);
   if (report.is_discarded()) {
     return Error{Code::kInternal, "result: the coordinator's report is not JSON"};
   }
   if (!result.error().empty()) {  // a part that failed is the reason, not what the coordinator was told to do then
     report["success"] = false;
-    report["ending"] = result.ending() == endings::CANCELLED ? "cancelled" : "broken";
+    report["ending"] = planners::to_string(static_cast<planners::Ending>(result.ending()));
     report["reason"] = error_of(result);
   }
   report["controller"] = options.controller;
@@ -206,18 +213,6 @@ Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::Goa
   return drawn;  // not before: numbers are worth more than a picture
 }
 
-int exit_code_of(const jostle_msgs::msg::GoalResult& result) {
-  switch (result.ending()) {
-    case endings::SUCCEEDED:
-      return common::kExitOk;
-    case endings::CANCELLED:
-      return common::kExitInterrupted;
-    case endings::BROKEN:
-    case endings::REFUSED:
-      return common::kExitBroken;
-    default:
-      return common::kExitFailed;
-  }
-}
+int exit_code_of(const jostle_msgs::msg::GoalResult& result) { return told(result.ending()).code; }
 
 }  // namespace jostle::task

@@ -14,6 +14,7 @@
 #include "perception/natnet/client.hpp"
 #include "perception/natnet/server.hpp"
 #include "tests/fuzz/wire/mutation.hpp"
+#include "tests/support/soon.hpp"
 #include "tests/support/test_domain.hpp"
 
 namespace jostle::tests {
@@ -138,11 +139,7 @@ class Fuzzer {
   }
 
   static void wait_for(const char* failure, const std::function<bool()>& condition) {
-    const auto deadline = std::chrono::steady_clock::now() + kPatience;
-    while (!condition()) {
-      if (std::chrono::steady_clock::now() > deadline) throw std::runtime_error(failure);
-      poll(nullptr, 0, 5);
-    }
+    if (!soon(kPatience, condition)) throw std::runtime_error(failure);
   }
 
   const long inputs_;

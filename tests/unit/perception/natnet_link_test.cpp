@@ -2,12 +2,11 @@
 
 #include <gmock/gmock.h>
 
-#include <poll.h>
-
 #include <mutex>
 
 #include "perception/natnet/client.hpp"
 #include "perception/natnet/server.hpp"
+#include "tests/support/soon.hpp"
 #include "tests/support/test_domain.hpp"
 
 namespace jostle::perception::natnet {
@@ -15,17 +14,9 @@ namespace {
 
 using namespace std::chrono_literals;
 using testing::HasSubstr;
+using tests::soon;
 
 constexpr auto kPatience = 60s;
-
-bool soon(std::chrono::milliseconds patience, const std::function<bool()>& condition) {
-  const auto deadline = std::chrono::steady_clock::now() + patience;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() >= deadline) return false;
-    poll(nullptr, 0, 5);
-  }
-  return true;
-}
 
 // Keeps what a client sees.
 class Eyes {

@@ -83,6 +83,13 @@ Result<void> validate(const RolloutBatch& batch) {
     return invalid("step_duration", fmt::format("{} s", batch.step_duration),
                    fmt::format("more than 0, at most {} s", kMaxStepDuration));
   }
+  if (!(batch.rest >= 0 && batch.rest <= kMaxStepDuration)) {
+    return invalid("rest", fmt::format("{} s", batch.rest), fmt::format("0 to {} s", kMaxStepDuration));
+  }
+  if (batch.rest > 0 && batch.stop_hopeless) {
+    return invalid("rest", "it together with stop_hopeless",
+                   "one of them: the bound of what is to come knows nothing of rests");
+  }
   if (batch.x0.q.size() > kMaxStateSize || batch.x0.v.size() > kMaxStateSize) {
     return invalid("x0", fmt::format("{} + {} values", batch.x0.q.size(), batch.x0.v.size()),
                    fmt::format("at most {} each", kMaxStateSize));
@@ -156,10 +163,11 @@ Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, doub
     return invalid("nominal.nu", std::to_string(batch.nominal.nu), std::to_string(layout.nu));
   }
   time_step = std::max(time_step, batch.fidelity.time_step);
-  const double steps = batch.step_duration / time_step;
-  if (steps < 0.5 || std::abs(steps - std::round(steps)) > 1e-6 * steps) {
-    return invalid("step_duration", fmt::format("{} s", batch.step_duration),
-                   fmt::format("a multiple of the time step, {} s", time_step));
+  for (const auto& [field, duration] : {std::pair("step_duration", batch.step_duration), {"rest", batch.rest}}) {
+    if (duration == 0) continue;  // only a rest may be
+    const double steps = duration / time_step;
+    if (steps >= 0.5 && std::abs(steps - std::round(steps)) <= 1e-6 * steps) continue;
+    return invalid(field, fmt::format("{} s", duration), fmt::format("a multiple of the time step, {} s", time_step));
   }
   return {};
 }

@@ -77,6 +77,9 @@ struct RolloutBatch {
   ControlSequence nominal;       ///< [n][nu]
   std::vector<double> u_before;  ///< [nu] control before step 0, for c_a; the thesis's u_{-1} = 0
   double step_duration = 1.0;    ///< Delta_t, seconds; a multiple of the world's time step
+  /// t_rest of Sec. 5.2, seconds, a multiple of the world's time step: after each control step all controls are 0 for
+  /// so long, and only then is the step over. It belongs to F: whoever executes such a plan rests as well.
+  double rest = 0.0;
   SamplingLaw law;
   std::uint32_t first_sample = 0;
   std::uint32_t samples = 1;  ///< K >= 1

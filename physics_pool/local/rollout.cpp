@@ -32,6 +32,8 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
   const ControlSequence controls = sample_controls(batch.nominal, batch.law, sample);
   const int steps = controls.steps();
   const int engine_steps = static_cast<int>(std::lround(batch.step_duration / dynamics.time_step()));
+  const int rest_steps = static_cast<int>(std::lround(batch.rest / dynamics.time_step()));
+  const std::vector<double> no_control(static_cast<std::size_t>(controls.nu), 0.0);
   const auto obsolete = [&signals, sample] { return signals.is_obsolete(sample); };
 
   RolloutOutcome outcome{.sample = sample};
@@ -42,13 +44,23 @@ RolloutOutcome run_rollout(Dynamics& dynamics, const RolloutBatch& batch, std::u
     return std::move(outcome);
   };
 
-  for (int t = 0; t < steps; ++t) {
-    const auto u = std::as_const(controls).step(t);
-    auto advance =
-        dynamics.advance(x, u, engine_steps, obsolete,
+  const auto advance_by = [&](std::span<const double> u, int engine_steps_of_it) {
+    Advance advance =
+        dynamics.advance(x, u, engine_steps_of_it, obsolete,
                          {.noise = batch.noise, .stream = {.sample = sample}, .first_step = outcome.engine_steps});
     outcome.engine_steps += advance.engine_steps;
     outcome.thawed += advance.thawed;
+    return advance;
+  };
+
+  for (int t = 0; t < steps; ++t) {
+    const auto u = std::as_const(controls).step(t);
+    Advance advance = advance_by(u, engine_steps);
+    if (rest_steps > 0 && !advance.interrupted && advance.diverged.empty()) {
+      const StepFacts before = advance.facts;
+      advance = advance_by(no_control, rest_steps);
+      advance.facts.robot_hit_fixture |= before.robot_hit_fixture;
+    }
     if (advance.interrupted) return finish(End::kSkipped);
     if (!advance.diverged.empty()) {
       outcome.reason = std::move(advance.diverged);

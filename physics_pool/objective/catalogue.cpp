@@ -128,11 +128,50 @@ const TermKind kObstruction{
     .meaning = "per other object whose centre is in the hand at the end",
     .final = [](const TaskGeometry& g, const State& x, Values) -> double { return count_obstructions(g, x); }};
 
+// k_act of Eq. 5.4: what an action costs is its time.
+const TermKind kAction{.name = "action",
+                       .unit = "1",
+                       .weight = 0.0,
+                       .meaning = "k_act of Eq. 5.4: per action, whatever it does",
+                       .running = [](const Step&, Values) { return 1.0; }};
+
+const TermKind kRim{
+    .name = "rim",
+    .unit = "1",
+    .weight = 0.0,
+    .meaning = "w_e of Eq. 5.4: like edge, with a safe zone for each object's own size, for objects that were moved",
+    .parameters = {{.name = "rate", .unit = "1/m", .initial = 25.0, .meaning = "k, of the exponent k·d_E"},
+                   {.name = "exponent_max",
+                    .unit = "1",
+                    .initial = 20.0,
+                    .meaning = "cap of the exponent; one that pushes reach would make a fast push no dearer than a "
+                               "slow one"},
+                   {.name = "margin",
+                    .unit = "m",
+                    .initial = 0.01,
+                    .meaning = "least distance of a safe object's footprint, as a disc, from the surface's border"},
+                   {.name = "still",
+                    .unit = "m",
+                    .initial = 0.001,
+                    .meaning = "an object that moved less than this was not moved"}},
+    .running = [](const Step& s, Values v) {
+      return rim_cost(s.geometry, s.x0, s.x1, {.rate = v[0], .exponent_max = v[1], .margin = v[2], .still = v[3]});
+    }};
+
+const TermKind kMiss{
+    .name = "miss",
+    .unit = "1/m^2",
+    .weight = 0.0,
+    .meaning =
+        "w_f of Eq. 5.5, a push's terminal cost of Sec. 5.4: how far outside the goal region the target is, "
+        "squared; 0 for tasks without a region",
+    .final = [](const TaskGeometry& g, const State& x, Values) { return miss_cost(g, x); }};
+
 // Sums are made in this order: it is part of the last bit of every cost.
 std::vector<const TermKind*>& catalogue() {
-  static std::vector<const TermKind*> kinds{&kAcceleration, &kDisturbance, &kEdge,       &kTopple,
-                                            &kDrop,         &kObstacle,    &kCollision,  &kIntrusion,
-                                            &kContact,      &kGoal,        &kObstruction};
+  static std::vector<const TermKind*> kinds{&kAcceleration, &kDisturbance, &kEdge,      &kTopple,  &kDrop,
+                                            &kObstacle,     &kCollision,   &kIntrusion, &kContact, &kGoal,
+                                            &kObstruction,  &kAction,      &kRim,       &kMiss};
   return kinds;
 }
 

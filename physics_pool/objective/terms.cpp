@@ -46,6 +46,25 @@ double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1,
   return sum;
 }
 
+double rim_cost(const TaskGeometry& geometry, const State& x0, const State& x1, const RimCost& rim) {
+  const StateView before = geometry.view(x0), after = geometry.view(x1);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < before.objects(); ++i) {
+    const double* p = after.object(i).position();
+    const double moved = std::sqrt(squared_distance(before.object(i).position(), p));
+    if (moved < rim.still || geometry.surface.contains(p[0], p[1], geometry.footprints[i] + rim.margin)) continue;
+    sum += std::exp(std::min(rim.rate * moved, rim.exponent_max));
+  }
+  return sum;
+}
+
+double miss_cost(const TaskGeometry& geometry, const State& x) {
+  if (!geometry.kind->has_goal) return 0.0;
+  const double outside =
+      std::sqrt(squared_distance(geometry.task.goal, geometry.view(x).target().position())) - geometry.task.goal.radius;
+  return outside > 0 ? outside * outside : 0.0;
+}
+
 double obstacle_cost(const TaskGeometry& geometry, const State& x, const ObstacleCost& obstacle) {
   if (!geometry.task.obstacle) return 0.0;
   const auto nearness = [&](const double* p) {

@@ -26,6 +26,21 @@ struct EdgeCost {
 /// zone at x1, where d_E is how far the object moved from x0 to x1.
 double edge_cost(const TaskGeometry& geometry, const State& x0, const State& x1, const EdgeCost& edge);
 
+struct RimCost {
+  double rate = 25.0;          ///< k, 1/m
+  double exponent_max = 20.0;  ///< cap of the exponent
+  double margin = 0.01;        ///< m; least distance of a safe footprint from the surface's border
+  double still = 0.001;        ///< m; an object that moved less was not moved
+};
+
+/// Returns the edge cost of Eq. 5.4: the sum of exp(min(k·d_E, cap)) over all objects that were moved from x0 to x1, by
+/// d_E, and whose footprint at x1, taken as a disc around it, is nearer to the surface's border than `margin`.
+double rim_cost(const TaskGeometry& geometry, const State& x0, const State& x1, const RimCost& rim);
+
+/// Returns L_f of a push (Sec. 5.4): (R_o - R_g)^2, m^2, where R_o is the target's distance from the middle of the goal
+/// region of radius R_g; 0 inside it and for tasks that have none.
+double miss_cost(const TaskGeometry& geometry, const State& x);
+
 struct ObstacleCost {
   double target = 5.0;    ///< w_s, m^2
   double pusher = 1.0;    ///< w_p, m^2

@@ -314,8 +314,9 @@ Result<BatchReply> PararealPool::run(const RolloutBatch& batch, TimePoint deadli
     known = found->second.get();
   }
   if (auto ok = validate(batch, known->geometry.layout, known->scene.physics.time_step); !ok) return ok.error();
-  // Noise is drawn by the step within the whole rollout, so slices would draw other numbers.
-  if (batch.wait || !batch.noise.is_off()) return pool_.run(batch, deadline, stop);
+  // Noise is drawn by the step within the whole rollout, so slices would draw other numbers; and cheap models stop at
+  // once where there is no control, so they know nothing of rests.
+  if (batch.wait || !batch.noise.is_off() || batch.rest > 0) return pool_.run(batch, deadline, stop);
   std::uint32_t whole = 0;
   if (options_.split_by_itself) {
     auto split_result = choose(*known, batch, deadline, stop);

@@ -54,7 +54,10 @@ TaskGeometry::TaskGeometry(const Scene& scene)
       planar(as_planar(scene.robot.model)),
       disc_radius(physics_pool::disc_radius(scene.robot.model).value_or(0.0)) {
   target.name.clear();  // a copy must not allocate
-  for (const SceneObject& object : scene.objects) rest_heights.push_back(object.rest_height());
+  for (const SceneObject& object : scene.objects) {
+    rest_heights.push_back(object.rest_height());
+    footprints.push_back(object.shape == Shape::kBox ? std::hypot(object.size[0], object.size[1]) / 2 : object.radius);
+  }
 }
 
 Eigen::Isometry3d tool_pose(const TaskGeometry& geometry, const State& x) {

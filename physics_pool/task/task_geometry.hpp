@@ -18,6 +18,7 @@ struct TaskGeometry {
   StateLayout layout;
   Surface surface;
   std::vector<double> rest_heights;  ///< [objects] m
+  std::vector<double> footprints;    ///< [objects] m, radius of the smallest disc around each, seen from above
   SceneTask task;
   const TaskKind* kind;  ///< what task.kind means
   SceneObject target;    ///< the target's shape, without its name; the state says where it is

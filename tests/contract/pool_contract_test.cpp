@@ -304,6 +304,7 @@ TEST_P(PoolContract, NoiseIsTheSameEverywhereAndForEveryCandidate) {
   batch.stop_losers = false;
   batch.want_all_trajectories = true;
   batch.noise = {.sigma = 0.003, .slope = 0.02, .seed = 5};
+  batch.rest = 0.1;
 
   const BatchReply reply = run(batch);
 
@@ -377,6 +378,9 @@ TEST_P(PoolContract, BadFieldIsNamed) {
       {"law.stream", [](RolloutBatch& b) { b.law.stream = kSamplingStreams; }},
       {"noise.sigma", [](RolloutBatch& b) { b.noise.sigma = -1; }},
       {"noise.slope", [&](RolloutBatch& b) { b.noise.slope = kNaN; }},
+      {"rest", [](RolloutBatch& b) { b.rest = -0.1; }},
+      {"rest", [](RolloutBatch& b) { b.rest = 0.1234567; }},
+      {"rest", [](RolloutBatch& b) { b.rest = 0.2, b.stop_hopeless = true; }},
       {"noise", [](RolloutBatch& b) { b.noise.sigma = 0.003, b.fidelity.freeze = true; }},
       {"incumbent", [&](RolloutBatch& b) { b.incumbent = kNaN; }},
       {"objective.edge", [](RolloutBatch& b) { b.objective["edge"].weight = -1; }},

@@ -74,6 +74,7 @@ msg::BatchDescription to_wire(const RolloutBatch& batch) {
   wire.nominal(batch.nominal.values);
   wire.u_before(batch.u_before);
   wire.step_duration(batch.step_duration);
+  wire.rest(batch.rest);
   wire.sigma(batch.law.sigma);
   wire.limit(batch.law.limit);
   wire.scales(batch.law.scales);
@@ -108,6 +109,7 @@ RolloutBatch from_wire(msg::BatchDescription wire) {
   batch.nominal = {.nu = wire.nu(), .values = std::move(wire.nominal())};
   batch.u_before = std::move(wire.u_before());
   batch.step_duration = wire.step_duration();
+  batch.rest = wire.rest();
   batch.law = {.sigma = std::move(wire.sigma()),
                .limit = std::move(wire.limit()),
                .scales = std::move(wire.scales()),

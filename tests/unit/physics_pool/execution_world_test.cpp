@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "physics_pool/local/rollout.hpp"
 #include "tests/support/planar.hpp"
 #include "tests/support/scenes.hpp"
 
@@ -114,6 +115,44 @@ TEST(Disturbance, IsDrawnByTheStepOfTheWholeRollout) {
   Simulator elsewhere(world);
   (void)elsewhere.advance(y, u, kSteps, {}, {.noise = noise, .first_step = kSteps});
   EXPECT_EQ(x, y);
+}
+
+// Sec. 5.2: noise that grows with the control is silent while a rollout rests, and counts on all the same.
+TEST(Rest, OfARolloutIsAnActionWithoutControlsInTheWorld) {
+  const WorldPtr world = compiled();
+  const double h = world->time_step();
+  const int rest = 60;
+  const std::vector<double> u{0.1, 0.1, 0.3, 0}, none(4, 0.0);
+  for (const VelocityNoise& noise : {VelocityNoise{}, VelocityNoise{.slope = 0.05, .seed = 3}}) {
+    RolloutBatch batch{.world = world->hash(), .x0 = initial_state(world->scene()), .u_before = none};
+    for (int t = 0; t < 2; ++t) batch.nominal.append(u);
+    batch.law = {.sigma = none, .limit = std::vector<double>(4, 1.0)};
+    batch.step_duration = kSteps * h;
+    batch.rest = rest * h;
+    batch.noise = noise;
+    Simulator model(world), same(world);
+    BatchSignals signals;
+    const RolloutOutcome outcome = run_rollout(model, batch, 0, signals);
+    ASSERT_EQ(outcome.end, End::kCompleted);
+    EXPECT_EQ(outcome.engine_steps, 2u * (kSteps + rest));
+    State x = batch.x0;
+    std::uint64_t done = 0;
+    for (int t = 0; t < 2; ++t) {
+      for (const auto& [control, steps] : {std::pair(u, kSteps), {none, rest}}) {
+        (void)same.advance(x, control, steps, {}, {.noise = noise, .first_step = done});
+        done += static_cast<std::uint64_t>(steps);
+      }
+      EXPECT_EQ(outcome.trajectory[static_cast<std::size_t>(t) + 1], x);
+    }
+    if (!noise.is_off()) continue;
+    ExecutionWorld truth(world);
+    for (int t = 0; t < 2; ++t) {
+      after(truth, u);
+      truth.begin(none);
+      for (int i = 0; i < rest; ++i) ASSERT_TRUE(truth.step());
+    }
+    EXPECT_EQ(truth.state(), x);
+  }
 }
 
 TEST(ExecutionWorld, StaysNearTheQuietWorldWhenNoiseIsSmall) {

@@ -60,6 +60,38 @@ TEST_F(PushTerms, ObstacleCostIsCapped) {
   EXPECT_NEAR(tests::obstacle_cost(geometry, start, weights), (3 + 5) / 0.01, 1e-9);
 }
 
+TEST_F(PushTerms, MissIsHowFarOutsideTheGoalRegionSquared) {
+  place(start, 0, 0.2 - 0.3, 0.4);  // 0.5 m from the middle of a region of 4 cm
+  EXPECT_NEAR(miss_cost(geometry, start), 0.46 * 0.46, 1e-15);
+  place(start, 0, 0.2, 0.039);
+  EXPECT_EQ(miss_cost(geometry, start), 0.0);
+  EXPECT_EQ(miss_cost(TaskGeometry(tests::target_only()), initial_state(tests::target_only())), 0.0);
+}
+
+// The table is 1 m x 0.8 m, and the sliders' radius 51.15 mm.
+TEST_F(PushTerms, RimCostGrowsWithTheWayOfWhatIsMovedNearTheBorder) {
+  const RimCost rim{.rate = 20.0, .exponent_max = 5.0, .margin = 0.01, .still = 0.001};
+  const double safe = 0.4 - 0.05115 - 0.01;
+  State end = start;
+  place(start, 0, 0.0, safe - 0.1);
+  place(end, 0, 0.0, safe - 1e-6);
+  EXPECT_EQ(rim_cost(geometry, start, end, rim), 0.0);
+  place(end, 0, 0.0, safe + 1e-6);
+  EXPECT_NEAR(rim_cost(geometry, start, end, rim), std::exp(20 * 0.1), 1e-3);
+  place(start, 0, 0.0, safe + 1e-6 - 0.4);
+  EXPECT_NEAR(rim_cost(geometry, start, end, rim), std::exp(5.0), 1e-9);  // capped
+  place(start, 0, 0.0, safe + 1e-6 - 0.0009);                             // it stood there before
+  EXPECT_EQ(rim_cost(geometry, start, end, rim), 0.0);
+  place(end, 1, -0.45, 0.25);  // others count as well
+  EXPECT_GT(rim_cost(geometry, start, end, rim), 1.0);
+}
+
+TEST_F(PushTerms, EveryActionCostsItsWeight) {
+  const std::vector<double> u{0.1, 0.0};
+  const double without = running_cost(geometry, objective, u, u, start, start);
+  EXPECT_EQ(running_cost(geometry, objective_with({{"action", 7}}), u, u, start, start), without + 7.0);
+}
+
 TEST_F(PushTerms, NoObstacleCostsNothing) {
   const TaskGeometry free(tests::push_ahead());
   const State x = initial_state(tests::push_ahead());

@@ -25,6 +25,7 @@ RolloutBatch odd_batch() {
   batch.nominal = {.nu = 4, .values = kAwkward};
   batch.u_before = {1, 2, 3, -0.0};
   batch.step_duration = 0.7;
+  batch.rest = 0.3;
   batch.law = {.sigma = {1, 2},
                .limit = {3, 4},
                .scales = {5, 6, 7},
@@ -62,6 +63,7 @@ TEST(ConvertBatch, SurvivesTheWire) {
   EXPECT_EQ(hash_of(got.nominal.values), hash_of(wanted.nominal.values));
   EXPECT_EQ(hash_of(got.u_before), hash_of(wanted.u_before));
   EXPECT_EQ(got.step_duration, wanted.step_duration);
+  EXPECT_EQ(got.rest, wanted.rest);
   EXPECT_EQ(got.law.sigma, wanted.law.sigma);
   EXPECT_EQ(got.law.limit, wanted.law.limit);
   EXPECT_EQ(got.law.scales, wanted.law.scales);

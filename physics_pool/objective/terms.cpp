@@ -51,7 +51,8 @@ double rim_cost(const TaskGeometry& geometry, const State& x0, const State& x1, 
   double sum = 0.0;
   for (std::size_t i = 0; i < before.objects(); ++i) {
     const double* p = after.object(i).position();
-    const double moved = std::sqrt(squared_distance(before.object(i).position(), p));
+    const double* from = before.object(i).position();
+    const double moved = std::hypot(p[0] - from[0], p[1] - from[1]);  // not how far it fell
     if (moved < rim.still || geometry.surface.contains(p[0], p[1], geometry.footprints[i] + rim.margin)) continue;
     sum += std::exp(std::min(rim.rate * moved, rim.exponent_max));
   }

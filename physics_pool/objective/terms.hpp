@@ -33,8 +33,9 @@ struct RimCost {
   double still = 0.001;        ///< m; an object that moved less was not moved
 };
 
-/// Returns the edge cost of Eq. 5.4: the sum of exp(min(k·d_E, cap)) over all objects that were moved from x0 to x1, by
-/// d_E, and whose footprint at x1, taken as a disc around it, is nearer to the surface's border than `margin`.
+/// Returns the edge cost of Eq. 5.4: the sum of exp(min(k·d_E, cap)) over all objects that were moved from x0 to x1 in
+/// the plane, by d_E, and whose footprint at x1, taken as a disc around it, is nearer to the surface's border than
+/// `margin`.
 double rim_cost(const TaskGeometry& geometry, const State& x0, const State& x1, const RimCost& rim);
 
 /// Returns L_f of a push (Sec. 5.4): (R_o - R_g)^2, m^2, where R_o is the target's distance from the middle of the goal

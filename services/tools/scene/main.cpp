@@ -14,6 +14,7 @@
 
 #include "physics_pool/robot/kinematics.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
+#include "physics_pool/scenarios/chapter5.hpp"
 #include "physics_pool/scenarios/push.hpp"
 #include "physics_pool/scene/scene.hpp"
 #include "physics_pool/scene/task_kind.hpp"
@@ -32,8 +33,10 @@ struct Arguments {
   int chapter = 3;
   CLI::App* generates = nullptr;  // to see which options were given
   physics_pool::GenerateOptions generate;
+  physics_pool::GenerateAdaptiveOptions adaptive;
   physics_pool::GeneratePushOptions push;
-  std::optional<int> objects;  // 15 of Chapter 3, 3 of Chapter 7
+  std::optional<int> objects;  // 15 of Chapter 3, 8 of Chapter 5, 3 of Chapter 7
+  std::string task = "wide";
   std::string shape = "cylinder";
   std::string input, output = "-";
   std::vector<std::string> inputs;
@@ -44,13 +47,16 @@ struct Arguments {
 
 // Options that mean nothing for the scenes of a chapter are refused, not ignored.
 Result<void> check_chapter(const Arguments& arguments) {
-  const bool grasps = arguments.chapter == 3;
-  const std::vector<std::string> others =
-      grasps ? std::vector<std::string>{"--shape", "--integrator"} : std::vector<std::string>{"--table"};
-  for (const std::string& option : others) {
-    if (arguments.generates->count(option) == 0) continue;
-    return invalid(option, fmt::format("it for scenes of Chapter {}", arguments.chapter),
-                   grasps ? "--chapter 6 or 7 with it" : "--chapter 3 with it");
+  struct Own {
+    const char* option;
+    std::vector<int> chapters;  // whose scenes it means something for
+  };
+  for (const Own& own :
+       {Own{"--table", {3}}, Own{"--task", {5}}, Own{"--shape", {6, 7}}, Own{"--integrator", {6, 7}}}) {
+    if (arguments.generates->count(own.option) == 0 || std::ranges::count(own.chapters, arguments.chapter) > 0)
+      continue;
+    return invalid(own.option, fmt::format("it for scenes of Chapter {}", arguments.chapter),
+                   fmt::format("--chapter {} with it", fmt::join(own.chapters, " or ")));
   }
   return {};
 }
@@ -60,6 +66,15 @@ Result<Scene> make_scene(Arguments arguments) {
   if (arguments.chapter == 3) {
     arguments.generate.objects = arguments.objects.value_or(arguments.generate.objects);
     return physics_pool::generate_chapter3(arguments.generate);
+  }
+  if (arguments.chapter == 5) {
+    using physics_pool::AdaptiveTask;
+    arguments.adaptive.task = physics_pool::parse_adaptive_task(arguments.task).value_or(AdaptiveTask::kWide);
+    arguments.adaptive.seed = arguments.generate.seed;
+    if (arguments.adaptive.task != AdaptiveTask::kClutter && arguments.objects.value_or(0) > 0)
+      return invalid("--objects", std::to_string(*arguments.objects), "0, or --task clutter with it");
+    arguments.adaptive.objects = arguments.objects.value_or(arguments.adaptive.objects);
+    return physics_pool::generate_chapter5(arguments.adaptive);
   }
   arguments.push.seed = arguments.generate.seed;
   arguments.push.shape = arguments.shape == "box" ? physics_pool::Shape::kBox : physics_pool::Shape::kCylinder;
@@ -236,14 +251,21 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   arguments.generates = generates;
   generates
       ->add_option("--chapter", arguments.chapter,
-                   "whose scenes: 3, Sec. 3.3.1, grasping; 6, Sec. 6.3.3, pushing round an obstacle; 7, "
-                   "Sec. 7.4, pushing among sliders")
-      ->check(CLI::IsMember({3, 6, 7}))
+                   "whose scenes: 3, Sec. 3.3.1, grasping; 5, Sec. 5.6, tasks of different accuracy; 6, Sec. 6.3.3, "
+                   "pushing round an obstacle; 7, Sec. 7.4, pushing among sliders")
+      ->check(CLI::IsMember({3, 5, 6, 7}))
       ->capture_default_str();
   common::add_seed_option(*generates, "--seed", arguments.generate.seed, "equal seeds give equal scenes");
   generates->add_option(
       "--objects", arguments.objects,
-      "objects beside the target: 0 to 40, default 15, of Chapter 3; 0 to 3, default 3, of Chapter 7");
+      "objects beside the target: 0 to 40, default 15, of Chapter 3; 0 to 20, default 8, of the clutter of Chapter 5; "
+      "0 to 3, default 3, of Chapter 7");
+  generates
+      ->add_option("--task", arguments.task,
+                   "of Chapter 5: wide, a wide table and a large goal region; strip, a thin strip and a small one; "
+                   "changing, the one and then the other; l, two strips at a right angle; clutter, a grasp")
+      ->check(CLI::IsMember({"wide", "strip", "changing", "l", "clutter"}))
+      ->capture_default_str();
   generates
       ->add_option("--table", arguments.generate.table,
                    "side of the table of Chapter 3, m; 0: 0.6, larger for more than 15 objects")

@@ -19,7 +19,7 @@ using physics_pool::TimePoint;
 struct Problem {
   Hash world;  ///< planning world, known to the pool
   State x0;
-  ControlSequence initial;       ///< candidate to improve, at least one step
+  ControlSequence initial;       ///< candidate to improve, at least one step; planners that make their own need none
   std::vector<double> u_before;  ///< [nu] control before the candidate's first step; empty: at rest
   int iterations = 50;           ///< I_max
   /// No iteration begins once so many rollouts are spent; the last one may go beyond it.
@@ -33,6 +33,16 @@ struct Problem {
   std::uint64_t* rollouts_asked_for = nullptr;
 };
 
+/// An action that was considered first, and what it was found to be worth.
+struct Choice {
+  int actions = 0;      ///< of the sequence that begins with it
+  double speed = 0.0;   ///< m/s, of the robot in the plane
+  double value = 0.0;   ///< expected cost, of the action and of all that follows; less is better
+  double spread = 0.0;  ///< standard deviation of that over the noises that were tried
+
+  bool operator==(const Choice&) const = default;
+};
+
 /// The best sequence found, even if it does not reach the goal.
 struct Plan {
   ControlSequence controls;  ///< u_0 … u_{n-1}
@@ -43,7 +53,9 @@ struct Plan {
   bool at_goal = false;
   int iterations = 0;
   std::uint64_t rollouts = 0;
-  int denials = 0;  ///< successes of reduced physics that full physics denied
+  int denials = 0;              ///< successes of reduced physics that full physics denied
+  std::vector<Choice> choices;  ///< of planners that choose among several first actions
+  int chosen = -1;              ///< index into choices
 };
 
 /// Progress of a running plan, once per iteration.

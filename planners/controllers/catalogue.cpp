@@ -35,6 +35,24 @@ Result<Outcome> push(const ControlSetup& setup, const ControllerOptions& options
   return run_mpc(setup, options.mpc, on_event, std::move(stop));
 }
 
+bool adapts_in_the_plane(const Scene& scene) { return pushes_in_the_plane(scene) || grasps_in_the_plane(scene); }
+
+AdaptiveOptions as_it_is(AdaptiveOptions options) { return options; }
+
+// `method` makes one of the three methods of Sec. 5.6 of the same options.
+template <AdaptiveOptions (*method)(AdaptiveOptions)>
+Result<Outcome> adapt(const ControlSetup& setup, const ControllerOptions& options, const OnEvent& on_event,
+                      std::stop_token stop) {
+  return run_adaptive(setup, method(options.adaptive), on_event, std::move(stop));
+}
+
+template <AdaptiveOptions (*method)(AdaptiveOptions)>
+std::unique_ptr<Planner> adaptive_planner(physics_pool::Pool& pool, const physics_pool::TaskGeometry& geometry,
+                                          const PbstoOptions& optimizer, const ControllerOptions& options,
+                                          OnProgress on_progress) {
+  return std::make_unique<AdaptivePlanner>(pool, geometry, optimizer, method(options.adaptive), std::move(on_progress));
+}
+
 constexpr ControllerKind kOnline{.name = "or",
                                  .purpose = "online re-planning (Alg. 2)",
                                  .parameters = "experiments/grasping.yaml",
@@ -50,9 +68,27 @@ constexpr ControllerKind kMpc{.name = "mpc",
                               .parameters = "experiments/pushing.yaml",
                               .fits = pushes_in_the_plane,
                               .run = push};
+constexpr ControllerKind kTampc{.name = "tampc",
+                                .purpose = "task-adaptive control, fast or slow (Alg. 6)",
+                                .parameters = "experiments/adaptive.yaml",
+                                .fits = adapts_in_the_plane,
+                                .run = adapt<as_it_is>,
+                                .planner = adaptive_planner<as_it_is>};
+constexpr ControllerKind kUampc{.name = "uampc",
+                                .purpose = "the same with slow actions only (Sec. 5.5)",
+                                .parameters = "experiments/adaptive.yaml",
+                                .fits = adapts_in_the_plane,
+                                .run = adapt<slow_only>,
+                                .planner = adaptive_planner<slow_only>};
+constexpr ControllerKind kSlowMpc{.name = "slow-mpc",
+                                  .purpose = "one slow plan without a thought of noise (MPC of Sec. 5.5)",
+                                  .parameters = "experiments/adaptive.yaml",
+                                  .fits = adapts_in_the_plane,
+                                  .run = adapt<standard_mpc>,
+                                  .planner = adaptive_planner<standard_mpc>};
 
 std::vector<const ControllerKind*>& catalogue() {
-  static std::vector<const ControllerKind*> kinds{&kOnline, &kNaive, &kMpc};
+  static std::vector<const ControllerKind*> kinds{&kOnline, &kNaive, &kMpc, &kTampc, &kUampc, &kSlowMpc};
   return kinds;
 }
 
@@ -72,6 +108,13 @@ std::string controller_help() {
     text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", kind->name, kind->purpose);
   }
   return text;
+}
+
+std::unique_ptr<Planner> make_planner(const ControllerKind& kind, physics_pool::Pool& pool,
+                                      const physics_pool::TaskGeometry& geometry, const PbstoOptions& optimizer,
+                                      const ControllerOptions& options, OnProgress on_progress) {
+  if (kind.planner) return kind.planner(pool, geometry, optimizer, options, std::move(on_progress));
+  return std::make_unique<Pbsto>(pool, optimizer, std::move(on_progress));
 }
 
 void add_controller(const ControllerKind& kind) { catalogue().push_back(&kind); }

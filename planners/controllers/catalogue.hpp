@@ -2,11 +2,13 @@
 /// \file
 /// The catalogue of controllers: the only list of their names.
 
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "planners/adaptive/adaptive.hpp"
 #include "planners/control/controller.hpp"
 #include "planners/mpc/mpc.hpp"
 
@@ -16,8 +18,9 @@ namespace jostle::planners {
 struct ControllerOptions {
   ControlOptions control;
   MpcOptions mpc;
+  AdaptiveOptions adaptive;
 
-  void set_plan_only(bool plan_only) { control.plan_only = mpc.plan_only = plan_only; }
+  void set_plan_only(bool plan_only) { control.plan_only = mpc.plan_only = adaptive.plan_only = plan_only; }
 };
 
 /// One controller.
@@ -32,7 +35,17 @@ struct ControllerKind {
   /// Runs one task to its end: see run_controller and run_mpc.
   Result<Outcome> (*run)(const ControlSetup& setup, const ControllerOptions& options, const OnEvent& on_event,
                          std::stop_token stop);
+
+  /// Makes the planner that it runs with, which keeps references to pool and geometry; null: a Pbsto.
+  std::unique_ptr<Planner> (*planner)(physics_pool::Pool& pool, const physics_pool::TaskGeometry& geometry,
+                                      const PbstoOptions& optimizer, const ControllerOptions& options,
+                                      OnProgress on_progress) = nullptr;
 };
+
+/// Makes the planner of a controller. Pool and geometry outlive it.
+std::unique_ptr<Planner> make_planner(const ControllerKind& kind, physics_pool::Pool& pool,
+                                      const physics_pool::TaskGeometry& geometry, const PbstoOptions& optimizer,
+                                      const ControllerOptions& options, OnProgress on_progress = {});
 
 /// Returns all controllers. Where nobody names one, a scene gets the first that fits it.
 std::span<const ControllerKind* const> controllers();

@@ -109,6 +109,13 @@ Result<void> Execution::act() {
   return observe();
 }
 
+Result<void> Execution::rest(double duration) {
+  if (duration <= 0) return {};
+  const std::vector<double> none(static_cast<std::size_t>(layout().nu), 0.0);
+  if (auto ok = setup_.robot.execute(none, duration, stop_); !ok) return ok;
+  return observe();
+}
+
 Result<void> Execution::move(std::span<const double> u, Phase phase) {
   notify(phase);
   if (auto ok = setup_.robot.execute(u, step_duration_, stop_); !ok) return ok;

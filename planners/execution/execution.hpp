@@ -73,7 +73,7 @@ struct Outcome {
   std::chrono::duration<double> plan_time{};      ///< time that the first plan took; 0 if it never came to be
   std::chrono::duration<double> planning_time{};  ///< time that all plans took, with one that ran out of time
   std::chrono::duration<double> total_time{};
-  Trajectory observed;  ///< before the first action and after each
+  Trajectory observed;  ///< before the first action and after each, and after each rest
   std::vector<std::string> dropped;
 
   /// Notes how the run ended, and why, in words for people.
@@ -121,6 +121,10 @@ class Execution {
 
   /// Executes u_0, removes it and x_0 from the plan, observes.
   Result<void> act();
+
+  /// Applies no control for so long, s, and observes; nothing where it is 0. Called after act(), it belongs to the
+  /// action, and what it came to is the state that the rest of the plan starts from.
+  Result<void> rest(double duration);
 
   /// Applies u, which belongs to no plan, and observes.
   Result<void> move(std::span<const double> u, Phase phase);

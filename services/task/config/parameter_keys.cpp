@@ -217,6 +217,54 @@ void add_mpc(std::vector<ParameterKey>& keys) {
       [](auto& p) -> auto& { return p.controller.mpc.straight_speed; }));
 }
 
+ParameterKey value_rule() {
+  using Value = planners::AdaptiveOptions::Value;
+  ParameterKey rule = bare("adaptive.value", "", 0, 0,
+                           "What stands for the value of the state after an action: the costs from the next action on "
+                           "(Eq. 5.3), or line 9 of Alg. 6 as printed, which counts the first action twice.");
+  rule.words = {"next", "printed"};
+  rule.get = [words = rule.words](const Parameters& p) {
+    return ParameterValue(words[p.controller.adaptive.value == Value::kNext ? 0 : 1]);
+  };
+  rule.set = [words = rule.words](Parameters& p, const ParameterValue& value) {
+    p.controller.adaptive.value = std::get<std::string>(value) == words[0] ? Value::kNext : Value::kPrinted;
+  };
+  return rule;
+}
+
+void add_adaptive(std::vector<ParameterKey>& keys) {
+  constexpr double kMostCandidates = 1000;
+  keys.push_back(key(
+      "adaptive.sequences", "", 1, kMostCandidates, "Candidates of a decision (N of Alg. 6).",
+      [](auto& p) -> auto& { return p.controller.adaptive.sequences; }));
+  keys.push_back(key(
+      "adaptive.least_actions", "", 1, physics_pool::kMaxSteps, "Actions of the fastest candidate (n_min of Alg. 7).",
+      [](auto& p) -> auto& { return p.controller.adaptive.least_actions; }));
+  keys.push_back(key(
+      "adaptive.most_actions", "", 1, physics_pool::kMaxSteps,
+      "Actions of the slowest candidate (n_max of Alg. 7), and of every one of `uampc` and `slow-mpc`.",
+      [](auto& p) -> auto& { return p.controller.adaptive.most_actions; }));
+  keys.push_back(key(
+      "adaptive.samples", "", 0, physics_pool::kMaxSamples,
+      "Noisy rollouts of each candidate's first action (Q of Alg. 6); 0 judges candidates by their plans alone.",
+      [](auto& p) -> auto& { return p.controller.adaptive.samples; }));
+  keys.push_back(key(
+      "adaptive.iterations", "", 0, kManyIterations, "Iterations of the optimizer, at most (I_max of Alg. 9).",
+      [](auto& p) -> auto& { return p.controller.adaptive.iterations; }));
+  keys.push_back(key(
+      "adaptive.noise", "", 0, 1e3,
+      "How the planner believes noise to grow with speed (b of Eq. 5.10; thesis: 0.05, 0.075 or 0.1).",
+      [](auto& p) -> auto& { return p.controller.adaptive.noise; }));
+  keys.push_back(key(
+      "adaptive.rest", "s", 0, physics_pool::kMaxStepDuration,
+      "No control for so long after every action (t_rest of Sec. 5.2).",
+      [](auto& p) -> auto& { return p.controller.adaptive.rest; }));
+  keys.push_back(value_rule());
+  keys.push_back(key(
+      "adaptive.max_actions", "", 1, kManyIterations, "The task has failed after so many actions.",
+      [](auto& p) -> auto& { return p.controller.adaptive.max_actions; }));
+}
+
 }  // namespace
 
 std::string ParameterKey::wanted() const {
@@ -242,6 +290,7 @@ std::vector<ParameterKey> parameter_keys() {
   add_objective(keys);
   add_control(keys);
   add_mpc(keys);
+  add_adaptive(keys);
   return keys;
 }
 

@@ -62,6 +62,7 @@ void read(const YAML::Node& root, const std::string& origin, Parameters& paramet
   planners::ControlOptions& control = parameters.controller.control;
   control.step_duration = parameters.controller.mpc.step_duration = parameters.planner.step_duration;
   control.min_steps = parameters.planner.min_steps;
+  parameters.controller.adaptive.step_duration = parameters.planner.step_duration;
 }
 
 // What one key alone cannot be wrong in.
@@ -71,6 +72,11 @@ Result<void> check(const Parameters& parameters, const std::string& origin) {
     return invalid(origin + ": planner.sigma",
                    fmt::format("{} numbers and {} of planner.limit", planner.sigma.size(), planner.limit.size()),
                    "one of each for every axis of the robot");
+  }
+  const planners::AdaptiveOptions& adaptive = parameters.controller.adaptive;
+  if (adaptive.least_actions > adaptive.most_actions) {
+    return invalid(origin + ": adaptive.least_actions", std::to_string(adaptive.least_actions),
+                   fmt::format("at most adaptive.most_actions, {}", adaptive.most_actions));
   }
   if (planner.scales.empty()) return invalid(origin + ": planner.scales", "an empty list", "at least one factor");
   if (double(planner.rollouts) * planner.screening > physics_pool::kMaxSamples) {

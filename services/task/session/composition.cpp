@@ -26,9 +26,10 @@ Result<Composition> Composition::make(RunParts parts, physics_pool::Pool& pool) 
 
 Result<planners::Outcome> Composition::perform(robot_bridge::Robot& robot, perception::ObjectSource& objects,
                                                const Watch& watch, std::stop_token stop) {
-  planners::Pbsto optimizer(*pool_, parts_.parameters.planner, watch.on_progress);
-  const std::unique_ptr<planners::Planner> around = watch.around_planner ? watch.around_planner(optimizer) : nullptr;
-  planners::ControlSetup setup{.planner = around ? *around : optimizer,
+  const auto optimizer = planners::make_planner(*controller_, *pool_, geometry(), parts_.parameters.planner,
+                                                parts_.parameters.controller, watch.on_progress);
+  const std::unique_ptr<planners::Planner> around = watch.around_planner ? watch.around_planner(*optimizer) : nullptr;
+  planners::ControlSetup setup{.planner = around ? *around : *optimizer,
                                .robot = robot,
                                .objects = objects,
                                .geometry = geometry(),

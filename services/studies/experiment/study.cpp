@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "services/common/process/files.hpp"
+#include "services/studies/experiment/adaptive_study.hpp"
 #include "services/studies/experiment/grasping_study.hpp"
 #include "services/studies/experiment/prediction_study.hpp"
 #include "services/studies/experiment/push_study.hpp"
@@ -38,7 +39,8 @@ Result<std::unique_ptr<Study>> load_study(const std::string& name) {
     yaml::Fields fields(root, "", file.string());
     auto read = &read_grasping_study;
     fields.choice<decltype(read)>("study", read,
-                                  {{"grasping", &read_grasping_study},
+                                  {{"adaptive", &read_adaptive_study},
+                                   {"grasping", &read_grasping_study},
                                    {"prediction", &read_prediction_study},
                                    {"push", &read_push_study},
                                    {"timing", &read_timing_study}});

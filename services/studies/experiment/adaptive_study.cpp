@@ -1,0 +1,396 @@
+#include "services/studies/experiment/adaptive_study.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "physics_pool/local/execution_world.hpp"
+#include "physics_pool/local/thread_pool.hpp"
+#include "physics_pool/scenarios/chapter5.hpp"
+#include "services/common/charts/statistics.hpp"
+#include "services/common/results/results.hpp"
+#include "services/common/results/table.hpp"
+#include "services/studies/experiment/options.hpp"
+#include "services/task/session/composition.hpp"
+#include "services/world/in_process/in_process_world.hpp"
+
+namespace jostle::studies {
+namespace {
+
+using nlohmann::json;
+using planners::Ending;
+
+// One scene, one method, one level.
+struct Case {
+  std::string task, method;
+  double level = 0.0;
+  std::uint64_t seed = 0;
+
+  std::string name() const { return fmt::format("{} b {} {} seed {}", task, level, method, seed); }
+};
+
+json record_of(const Case& one, const planners::Outcome& outcome) {
+  return {{"seed", one.seed},
+          {"task", one.task},
+          {"method", one.method},
+          {"level", one.level},
+          {"success", outcome.success},
+          {"ending", planners::to_string(outcome.ending)},
+          {"reason", outcome.reason},
+          {"actions", outcome.actions},
+          {"rollouts", outcome.rollouts},
+          {"planning_seconds", outcome.planning_time.count()}};
+}
+
+json record_of(const Case& one, const std::string& error) {
+  json record = record_of(one, planners::Outcome{.ending = Ending::kBroken, .reason = error});
+  for (const char* key : {"actions", "rollouts", "planning_seconds"}) record[key] = nullptr;
+  return record;
+}
+
+// Each action with where the target was before it and what was considered.
+void note(const planners::ControlEvent& event, const physics_pool::TaskGeometry& geometry, json& way) {
+  if (event.phase != planners::Phase::kActing || !event.plan || event.plan->chosen < 0) return;
+  const planners::Plan& plan = *event.plan;
+  const double* p = geometry.view(*event.observed).target().position();
+  json considered = json::array();
+  for (const planners::Choice& choice : plan.choices) {
+    considered.push_back({{"actions", choice.actions},
+                          {"speed", choice.speed},
+                          {"value", common::number_or_null(choice.value)},
+                          {"spread", common::number_or_null(choice.spread)}});
+  }
+  way.push_back({{"x", p[0]},
+                 {"y", p[1]},
+                 {"speed", plan.choices[static_cast<std::size_t>(plan.chosen)].speed},
+                 {"chosen", plan.chosen},
+                 {"considered", std::move(considered)}});
+}
+
+Result<json> perform(const AdaptiveStudy& study, const Case& one, std::optional<double> believed,
+                     std::stop_token stop) {
+  const auto task = physics_pool::parse_adaptive_task(one.task);
+  auto scene_result = physics_pool::generate_chapter5({.task = *task, .seed = one.seed});
+  if (!scene_result) return scene_result.error();
+  auto truth_result = physics_pool::World::compile(*scene_result);
+  if (!truth_result) return truth_result.error();
+  physics_pool::ThreadPool pool(1);
+  task::Parameters parameters = study.parameters;
+  parameters.controller.adaptive.noise = believed.value_or(one.level);
+  auto run_result = task::Composition::make({.belief = *scene_result,
+                                             .belief_is_exact = true,
+                                             .parameters = std::move(parameters),
+                                             .controller = one.method,
+                                             .seed = one.seed},
+                                            pool);
+  if (!run_result) return run_result.error();
+  physics_pool::ExecutionWorld world(*truth_result, {.slope = one.level, .seed = one.seed});
+  world::SimulatedRobot robot(world);
+  world::SimulatedObjects objects(world, *scene_result);
+  json way = json::array();
+  auto outcome_result = run_result->perform(
+      robot, objects,
+      {.on_event = [&](const planners::ControlEvent& event) { note(event, run_result->geometry(), way); }}, stop);
+  if (!outcome_result) return outcome_result.error();
+  json record = record_of(one, *outcome_result);
+  record["way"] = std::move(way);
+  return record;
+}
+
+bool ended_as(const json& run, Ending ending) { return run.value("ending", "") == planners::to_string(ending); }
+double actions(const json& run) { return run["actions"]; }
+double rollouts(const json& run) { return run["rollouts"]; }
+double planning(const json& run) { return run["planning_seconds"]; }
+
+// Runs of one task at one level with one method.
+struct Cell {
+  Case what;
+  int successes = 0, broken = 0;
+  std::vector<const json*> runs;  // that came to an end, whatever it was; broken ones did not
+
+  void add(const json& run) {
+    if (ended_as(run, Ending::kBroken)) {
+      ++broken;
+      return;
+    }
+    runs.push_back(&run);
+    successes += run["success"] ? 1 : 0;
+  }
+
+  common::Share share() const { return common::wilson_interval(successes, static_cast<int>(runs.size())); }
+};
+
+template <class Value>
+common::Mean mean_over(const std::vector<const json*>& runs, Value value) {
+  std::vector<double> values;
+  for (const json* run : runs) values.push_back(value(*run));
+  return common::mean_of(values);
+}
+
+class AdaptiveStudyRunner final : public Study {
+ public:
+  explicit AdaptiveStudyRunner(AdaptiveStudy study) : Study(study.about), study_(std::move(study)) {}
+
+  void add_options(CLI::App& app) override {
+    seeds_.add_to(app, study_.first_seed, study_.last_seed);
+    app.add_option("--tasks", study_.tasks, "Only these, such as wide,strip")
+        ->delimiter(',')
+        ->check(CLI::IsMember({"wide", "strip", "changing", "l", "clutter"}));
+    app.add_option("--methods", study_.methods, "Only these, such as tampc,uampc")
+        ->delimiter(',')
+        ->check(CLI::IsMember({"tampc", "uampc", "slow-mpc"}));
+    app.add_option("--levels", study_.levels, "Slopes b of the noise (Eq. 5.10), such as 0,0.1")
+        ->delimiter(',')
+        ->check(CLI::Range(0.0, 1.0));
+    app.add_option("--believed", believed_, "The slope that the planner believes in (default: the world's)")
+        ->check(CLI::Range(0.0, 1.0));
+    app.add_option("--set", changes_, "One parameter, such as adaptive.samples=16; may be given again")
+        ->type_name("KEY=VALUE")
+        ->allow_extra_args(false);
+    add_jobs_option(app, jobs_, "Runs at a time; more than there are free cores make times longer");
+  }
+
+  Result<std::vector<std::string>> prepare() override {
+    if (auto ok = seeds_.apply(study_.first_seed, study_.last_seed); !ok) return ok.error();
+    auto parameters_result = task::with_settings(study_.parameters, changes_);
+    if (!parameters_result) return parameters_result.error();
+    study_.parameters = std::move(parameters_result).value();
+    std::vector<std::string> names;
+    cases_.clear();
+    for (std::uint64_t seed = study_.first_seed; seed <= study_.last_seed; ++seed) {
+      for (const std::string& task : study_.tasks) {
+        for (const double level : study_.levels) {
+          for (const std::string& method : study_.methods) {
+            cases_.push_back({.task = task, .method = method, .level = level, .seed = seed});
+            names.push_back(cases_.back().name());
+          }
+        }
+      }
+    }
+    return names;
+  }
+
+  json settings() const override { return {{"believed", believed_ ? json(*believed_) : json()}, {"set", changes_}}; }
+
+  int at_a_time() const override { return jobs_; }
+
+  Result<json> run_case(std::size_t index, std::stop_token stop) override {
+    return perform(study_, cases_[index], believed_, std::move(stop));
+  }
+
+  std::string news_of(const json& run) const override {
+    return fmt::format("{}, {} ({} actions, {} rollouts, {:.1f} s of planning)", run["ending"].get<std::string>(),
+                       run["reason"].get<std::string>(), run["actions"].get<int>(), run["rollouts"].get<int>(),
+                       planning(run));
+  }
+
+  StudyReport report(const std::vector<json>& records) const override {
+    json runs = json::array();  // with those that broke
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      if (records[i].is_null()) continue;
+      runs.push_back(records[i].contains("error") ? record_of(cases_[i], records[i]["error"].get<std::string>())
+                                                  : records[i]);
+    }
+    const std::vector<Cell> all = cells(runs);
+    json rows = json::array();
+    for (const Cell& cell : all) rows.push_back(row_of(cell));
+    return {.table = table_of(all),
+            .json = {{"title", title()},
+                     {"seconds_per_action", seconds_per_action()},
+                     {"settings", settings()},
+                     {"rows", std::move(rows)},
+                     {"runs", std::move(runs)}}};
+  }
+
+  bool has_figure() const override { return true; }
+
+  std::vector<common::Panel> figure(const json& report) const override {
+    return study_.shows_ways ? ways(report.at("runs")) : success_and_time(report.at("runs"));
+  }
+
+ private:
+  double seconds_per_action() const {
+    return study_.parameters.planner.step_duration + study_.parameters.controller.adaptive.rest;
+  }
+
+  common::Mean total(const Cell& cell) const {
+    const double each = seconds_per_action();
+    return mean_over(cell.runs, [each](const json& run) { return planning(run) + each * actions(run); });
+  }
+
+  std::vector<Cell> cells(const json& runs) const {
+    std::vector<Cell> result;
+    for (const std::string& task : study_.tasks) {
+      for (const double level : study_.levels) {
+        for (const std::string& method : study_.methods) {
+          result.push_back({.what = {.task = task, .method = method, .level = level}});
+          for (const json& run : runs) {
+            if (run["task"] == task && run["level"] == level && run["method"] == method) result.back().add(run);
+          }
+        }
+      }
+    }
+    return result;
+  }
+
+  std::string thesis_of(const Case& one) const {
+    const auto task = study_.thesis.find(one.task);
+    if (task == study_.thesis.end()) return "-";
+    const auto method = task->second.find(one.method);
+    return method == task->second.end() ? "-" : method->second;
+  }
+
+  std::string table_of(const std::vector<Cell>& all) const {
+    std::vector<std::vector<std::string>> rows{{"task", "b", "method", "success", "95 % interval", "actions",
+                                                "acting, s", "rollouts", "planning, s", "total, s", "thesis"}};
+    int broken = 0;
+    const double each = seconds_per_action();
+    for (const Cell& cell : all) {
+      const common::Share share = cell.share();
+      broken += cell.broken;
+      rows.push_back({cell.what.task, fmt::format("{}", cell.what.level), cell.what.method,
+                      fmt::format("{}/{}", share.successes, share.runs), common::interval_text(share.low, share.high),
+                      to_text(mean_over(cell.runs, actions), 1),
+                      to_text(mean_over(cell.runs, [each](const json& run) { return each * actions(run); }), 1),
+                      to_text(mean_over(cell.runs, rollouts), 0), to_text(mean_over(cell.runs, planning), 1),
+                      to_text(total(cell), 1), thesis_of(cell.what)});
+    }
+    std::string text = fmt::format("{}\n\n{}", title(), common::table(rows));
+    text += fmt::format(
+        "\nMeans over all runs, with what those that failed have spent, and 95 % intervals of the mean. An action and "
+        "its\n"
+        "rest take {} s, total is that and planning: the world stands still while its planner thinks.\n",
+        each);
+    if (broken > 0) text += fmt::format("Parts of the system failed in {} more runs, which count nowhere.\n", broken);
+    if (!study_.remark.empty()) text += study_.remark + "\n";
+    return text;
+  }
+
+  json row_of(const Cell& cell) const {
+    const common::Share share = cell.share();
+    json row{{"task", cell.what.task},
+             {"level", cell.what.level},
+             {"method", cell.what.method},
+             {"successes", share.successes},
+             {"runs", share.runs},
+             {"broken", cell.broken},
+             {"interval", {common::number_or_null(share.low), common::number_or_null(share.high)}},
+             {"thesis", thesis_of(cell.what)}};
+    const std::pair<const char*, common::Mean> means[] = {{"actions", mean_over(cell.runs, actions)},
+                                                          {"rollouts", mean_over(cell.runs, rollouts)},
+                                                          {"planning_seconds", mean_over(cell.runs, planning)},
+                                                          {"total_seconds", total(cell)}};
+    for (const auto& [key, mean] : means) {
+      row[key] = common::number_or_null(mean.value);
+      row[std::string(key) + "_half_width"] = common::number_or_null(mean.half_width);
+    }
+    return row;
+  }
+
+  // Fig. 5.3: a and b, success; c and d, time.
+  std::vector<common::Panel> success_and_time(const json& runs) const {
+    const std::vector<Cell> all = cells(runs);
+    std::vector<common::Panel> panels;
+    for (const bool is_time : {false, true}) {
+      for (const std::string& task : study_.tasks) {
+        common::Panel panel{.x_label = task + ": b", .y_label = is_time ? "total time, s" : "success"};
+        for (const std::string& method : study_.methods) {
+          common::Band band{.name = method};
+          for (const Cell& cell : all) {
+            if (cell.what.task != task || cell.what.method != method || cell.runs.empty()) continue;
+            const common::Share share = cell.share();
+            const common::Mean mean = total(cell);
+            band.x.push_back(cell.what.level);
+            band.low.push_back(is_time ? mean.value - mean.half_width : share.low);
+            band.high.push_back(is_time ? mean.value + mean.half_width : share.high);
+            band.middle.push_back(is_time ? mean.value : double(share.successes) / share.runs);
+          }
+          if (!band.x.empty()) panel.bands.push_back(std::move(band));
+        }
+        if (!panel.bands.empty()) panels.push_back(std::move(panel));
+      }
+    }
+    return panels;
+  }
+
+  // Fig. 5.4: the speed that was chosen where the target was, with the first method at the first level.
+  std::vector<common::Panel> ways(const json& runs) const {
+    std::vector<common::Panel> panels;
+    for (const std::string& task : study_.tasks) {
+      common::Panel panel{.x_label = task + ": action", .y_label = "speed, m/s", .counts_x = true};
+      for (const json& run : runs) {
+        if (run["task"] != task || run["level"] != study_.levels.front() || run["method"] != study_.methods.front() ||
+            !run.contains("way"))
+          continue;
+        common::Band band{.name = fmt::format("seed {}", run["seed"].get<std::uint64_t>())};
+        for (const json& action : run["way"]) {
+          band.x.push_back(static_cast<double>(band.x.size()) + 1);
+          band.middle.push_back(action["speed"]);
+          band.low.push_back(common::kNone);
+          band.high.push_back(common::kNone);
+        }
+        if (!band.x.empty()) panel.bands.push_back(std::move(band));
+      }
+      if (!panel.bands.empty()) panels.push_back(std::move(panel));
+    }
+    return panels;
+  }
+
+  AdaptiveStudy study_;
+  SeedsOption seeds_;
+  std::optional<double> believed_;
+  std::vector<std::string> changes_;
+  int jobs_ = 1;
+  std::vector<Case> cases_;
+};
+
+Result<void> check(const AdaptiveStudy& study, const std::string& origin) {
+  for (const std::string& task : study.tasks) {
+    if (!physics_pool::parse_adaptive_task(task))
+      return invalid(origin + ": tasks", "'" + task + "'", "wide, strip, changing, l or clutter");
+  }
+  const std::vector<std::string> known = planners::controller_names();
+  for (const std::string& method : study.methods) {
+    if (std::ranges::find(known, method) == known.end())
+      return invalid(origin + ": methods", "'" + method + "'", fmt::format("{}", fmt::join(known, ", ")));
+  }
+  for (const double level : study.levels) {
+    if (!(level >= 0 && level <= 1)) return invalid(origin + ": levels", fmt::format("{}", level), "0 to 1");
+  }
+  if (study.tasks.empty() || study.methods.empty() || study.levels.empty())
+    return invalid(origin + ": tasks, methods, levels", "an empty list", "at least one of each");
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Study>> read_adaptive_study(yaml::Fields& fields, const std::string& origin) {
+  AdaptiveStudy study{.about = read_about(fields)};
+  std::string parameters;
+  fields.required("parameters", parameters);
+  fields.required("tasks", study.tasks);
+  fields.required("methods", study.methods);
+  fields.required("levels", study.levels);
+  fields.section("seeds", true, [&](yaml::Fields& seeds) {
+    seeds.required("first", study.first_seed);
+    seeds.required("last", study.last_seed);
+  });
+  fields.choice<bool>("figure", study.shows_ways, {{"success", false}, {"ways", true}});
+  fields.optional("thesis", study.thesis);
+  fields.optional("remark", study.remark);
+  if (auto ok = check(study, origin); !ok) return ok.error();
+  auto parameters_result = task::load_parameters(std::filesystem::path(origin).parent_path() / parameters);
+  if (!parameters_result) return parameters_result.error();
+  study.parameters = *parameters_result;
+  // No clock decides: actions and rollouts are what is limited.
+  study.parameters.limits.timeout = std::chrono::hours(24);
+  return std::unique_ptr<Study>(std::make_unique<AdaptiveStudyRunner>(std::move(study)));
+}
+
+}  // namespace jostle::studies

@@ -18,11 +18,11 @@ struct AdaptiveOptions {
     kPrinted,
   };
 
-  int sequences = 5;      ///< N, candidates of a decision, >= 1; more speeds, and as many times the rollouts
+  int sequences = 6;      ///< N, candidates of a decision, >= 1; more speeds, and as many times the rollouts
   int least_actions = 1;  ///< n_min of Alg. 7, the fastest candidate's
-  int most_actions = 20;  ///< n_max of Alg. 7, the slowest candidate's, which is meant to be quasi-static
+  int most_actions = 10;  ///< n_max of Alg. 7, the slowest candidate's, which is meant to be quasi-static
   int samples = 8;        ///< Q, noisy rollouts of each candidate's first action; 0 judges by the plans alone
-  int iterations = 4;     ///< I_max of Alg. 9; more bend candidates further, at K rollouts each
+  int iterations = 2;     ///< I_max of Alg. 9; more bend candidates further, at K rollouts each
   double noise = 0.075;   ///< b of Eq. 5.10, as the planner believes it to be, >= 0
   double rest = 0.5;      ///< t_rest after every action, s, >= 0
   Value value = Value::kNext;

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "physics_pool/scenarios/chapter5.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -39,6 +40,50 @@ class RecordedRuns : public RunFixture {
 
   std::string out, err;
 };
+
+// Chapter 5: several speeds are considered, in a world whose noise grows with the speed.
+TEST_F(RecordedRuns, OfTaskAdaptiveControlDecideTheSameOnThreadsOnWorkersAndAgain) {
+  const auto scene_result = physics_pool::generate_chapter5({.task = physics_pool::AdaptiveTask::kStrip, .seed = 11});
+  ASSERT_TRUE(scene_result) << scene_result.error().message;
+  const auto scene = folder.write("strip.yaml", physics_pool::to_yaml(*scene_result));
+  std::vector<json> reports;
+  for (const char* pool : {"threads", "dds"}) {
+    const std::string file = folder.path() / (std::string(pool) + ".json");
+    finish({scene,
+            "--controller",
+            "tampc",
+            "--noise",
+            "0.1",
+            "--seed",
+            "3",
+            "--set",
+            "adaptive.sequences=3",
+            "--set",
+            "adaptive.samples=4",
+            "--set",
+            "objective.success_cost=0",
+            "--set",
+            "adaptive.max_actions=3",
+            "--workers",
+            "2",
+            "--pool",
+            pool,
+            "--json",
+            file,
+            "--record",
+            bag(pool)});
+    reports.push_back(json::parse(contents(file)));
+  }
+  EXPECT_EQ(reports[0]["controls"], reports[1]["controls"]);
+  EXPECT_EQ(reports[0]["observed_states"], reports[1]["observed_states"]);
+  EXPECT_EQ(reports[1]["controls"].size(), 2 * reports[1]["actions"].get<std::size_t>());  // each with its rest
+  EXPECT_GT(reports[1]["rollouts"], 3 * (1 + 4 + 8));                                      // something was improved
+
+  EXPECT_EQ(program_ends("jostle_replay", {bag("dds")}), 0) << out << err;
+  EXPECT_THAT(out, HasSubstr("BIT-EQUAL"));
+  EXPECT_EQ(program_ends("jostle_replay", {bag("dds"), "--set", "adaptive.noise=0"}), 1) << err;
+  EXPECT_THAT(out, HasSubstr("adaptive.noise: recorded 0.1, replayed 0"));
+}
 
 TEST_F(RecordedRuns, DecideTheSameAgainToTheLastBit) {
   record("run");

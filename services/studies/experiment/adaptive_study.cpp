@@ -247,26 +247,26 @@ class AdaptiveStudyRunner final : public Study {
   }
 
   std::string table_of(const std::vector<Cell>& all) const {
-    std::vector<std::vector<std::string>> rows{{"task", "b", "method", "success", "95 % interval", "actions",
-                                                "acting, s", "rollouts", "planning, s", "total, s", "thesis"}};
+    std::vector<std::vector<std::string>> ends{{"task", "b", "method", "success", "95 % interval", "thesis"}};
+    std::vector<std::vector<std::string>> costs{
+        {"task", "b", "method", "actions", "rollouts", "planning, s", "total, s"}};
     int broken = 0;
-    const double each = seconds_per_action();
     for (const Cell& cell : all) {
       const common::Share share = cell.share();
       broken += cell.broken;
-      rows.push_back({cell.what.task, fmt::format("{}", cell.what.level), cell.what.method,
-                      fmt::format("{}/{}", share.successes, share.runs), common::interval_text(share.low, share.high),
-                      to_text(mean_over(cell.runs, actions), 1),
-                      to_text(mean_over(cell.runs, [each](const json& run) { return each * actions(run); }), 1),
-                      to_text(mean_over(cell.runs, rollouts), 0), to_text(mean_over(cell.runs, planning), 1),
-                      to_text(total(cell), 1), thesis_of(cell.what)});
+      const std::string level = fmt::format("{}", cell.what.level);
+      ends.push_back({cell.what.task, level, cell.what.method, fmt::format("{}/{}", share.successes, share.runs),
+                      common::interval_text(share.low, share.high), thesis_of(cell.what)});
+      costs.push_back({cell.what.task, level, cell.what.method, to_text(mean_over(cell.runs, actions), 1),
+                       to_text(mean_over(cell.runs, rollouts), 0), to_text(mean_over(cell.runs, planning), 1),
+                       to_text(total(cell), 1)});
     }
-    std::string text = fmt::format("{}\n\n{}", title(), common::table(rows));
+    std::string text = fmt::format("{}\n\n{}\n{}", title(), common::table(ends), common::table(costs));
     text += fmt::format(
-        "\nMeans over all runs, with what those that failed have spent, and 95 % intervals of the mean. An action and "
-        "its\n"
-        "rest take {} s, total is that and planning: the world stands still while its planner thinks.\n",
-        each);
+        "\nMeans over all runs, with what those that failed have spent, and 95 % intervals of the mean. An\n"
+        "action and its rest take {} s; total is that for each action, and planning, for whose time the\n"
+        "world stands still.\n",
+        seconds_per_action());
     if (broken > 0) text += fmt::format("Parts of the system failed in {} more runs, which count nowhere.\n", broken);
     if (!study_.remark.empty()) text += study_.remark + "\n";
     return text;

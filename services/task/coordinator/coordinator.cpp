@@ -325,6 +325,9 @@ void Coordinator::note(const planners::ControlEvent& event, const physics_pool::
   feedback_.phase(word(event.phase));
   feedback_.actions(event.outcome.actions);
   feedback_.replans(event.outcome.replans);
+  if (event.plan && event.plan->chosen >= 0) {
+    feedback_.speed(event.plan->choices[static_cast<std::size_t>(event.plan->chosen)].speed);
+  }
   if (event.phase == planners::Phase::kPlanning) rollouts_before_ = feedback_.rollouts();
   if (event.observed && !event.observed->q.empty()) {
     feedback_.target_distance(geometry.kind->distance(geometry, *event.observed));

@@ -98,7 +98,8 @@ int main(int argc, char** argv) {
   app.add_option("keys", wanted, "Keys, or sections such as planner (default: all)");
   app.add_flag("--json", json, "Print JSON");
   app.add_flag("--markdown", markdown, "Print a table as docs/parameters.md has it");
-  app.add_option("--file", file_of, "Print a complete parameter file of this kind, grasping or pushing, to start from")
+  app.add_option("--file", file_of,
+                 "Print a complete parameter file of this kind, grasping, pushing or adaptive, to start from")
       ->excludes("keys");
   app.footer("Exit codes: 0 done, 2 an unknown key.");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
@@ -111,7 +112,8 @@ int main(int argc, char** argv) {
   if (!standards_result) return fail(standards_result.error());
   if (!file_of.empty()) {
     const auto found = std::ranges::find(*standards_result, file_of, &Standard::name);
-    if (found == standards_result->end()) return fail(invalid("--file", "'" + file_of + "'", "grasping or pushing"));
+    if (found == standards_result->end())
+      return fail(invalid("--file", "'" + file_of + "'", "grasping, pushing or adaptive"));
     fmt::print("{}", to_yaml(found->parameters));
     return common::kExitOk;
   }

@@ -11,7 +11,8 @@ namespace jostle::task {
 namespace {
 
 constexpr std::chrono::seconds kRateWindow{1};
-constexpr int kWorkerRank = 6;  // of the first worker: all else is more important
+constexpr int kAfterTarget = 3;  // parts before it
+constexpr int kWorkerRank = 6;   // of the first worker: all else is more important
 
 }  // namespace
 
@@ -43,6 +44,9 @@ std::string Display::text(const jostle_msgs::msg::Feedback& feedback) {
       {fmt::format("actions {:>2}", feedback.actions()), 5},
       {fmt::format("re-plans {:>2}", feedback.replans()), 2},
       {fmt::format("{:.1f} {}/s", total, feedback.unit()), 3}};
+  if (feedback.speed() > 0) {  // of controllers that choose one
+    parts.insert(parts.begin() + kAfterTarget, {fmt::format("speed {:>5.1f} cm/s", 100 * feedback.speed()), 1});
+  }
   parts.insert(parts.end(), workers.begin(), workers.end());
   const std::size_t width = line_.live() ? line_.width() : std::string::npos;
   return common::fitted_line(std::move(parts), width);

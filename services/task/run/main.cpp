@@ -66,6 +66,11 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::IsMember({"dds", "threads"}));
   app.add_option("--record", options.record, "Folder for a bag of the whole run; `jostle record` has more to say");
+  app.add_option(
+         "--noise", arguments.noise,
+         "How the simulated world's noise grows with speed (b of Eq. 5.10; thesis: 0.05, 0.075, 0.1), and, unless\n"
+         "--set adaptive.noise=… says otherwise, how the planner believes it to (default: 0, and the parameter's)")
+      ->check(CLI::Range(0.0, 1.0));
   app.add_option("--rate", options.rate, "World seconds per second while acting; 0: as fast as possible")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
@@ -99,6 +104,10 @@ int main(int argc, char** argv) {
   }
   if (options.arm.kind != Arm::Kind::kSim && arguments.level != "none") {
     return fail({Code::kInvalidArgument, "--uncertainty: got --arm " + arm + ", wanted sim: only it is disturbed"},
+                common::kExitUsage);
+  }
+  if (options.arm.kind != Arm::Kind::kSim && arguments.noise) {
+    return fail({Code::kInvalidArgument, "--noise: got --arm " + arm + ", wanted sim: only it is disturbed"},
                 common::kExitUsage);
   }
   if (pin) options.cores = common::allowed_cores();

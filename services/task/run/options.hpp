@@ -32,6 +32,8 @@ struct RunOptions {
   int workers = 2;
   std::vector<int> cores;  ///< dealt to the workers in turn; empty: not pinned
   std::uint64_t seed = 1;
+  /// b of Eq. 5.10: slope of the simulated world's noise over the speed, beside that of `level`.
+  double noise = 0.0;
   double rate = 0.0;  ///< of the simulated world; 0: as fast as possible
   Arm arm;            ///< what moves
   Sensor sensor;      ///< who sees the objects
@@ -45,6 +47,7 @@ struct RunOptions {
 /// What a command line says of a goal, as it was typed.
 struct GoalArguments {
   std::string scene, level = "none";
+  std::optional<double> noise;  ///< of `jostle run`, whose world is its own
   ParameterOptions parameters;
 };
 

@@ -196,6 +196,7 @@ Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::Goa
   report["controller"] = options.controller;
   report["predictor"] = options.predictor;
   report["uncertainty"] = physics_pool::to_string(options.level);
+  report["noise"] = options.noise;
   if (!options.pool.empty()) {  // otherwise the coordinator has one that we know nothing of
     report["pool"] = options.pool;
     report["workers"] = options.workers;

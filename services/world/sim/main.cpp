@@ -29,6 +29,10 @@ int main(int argc, char** argv) {
       app.add_option("--uncertainty", level, "How disturbed it is and how badly seen: none, low, medium, high")
           ->capture_default_str();
   common::suggest(uncertainty, {"none", "low", "medium", "high"});
+  double slope = 0.0;
+  app.add_option("--noise", slope, "How its noise grows with the robot's speed, beside that (b of Eq. 5.10)")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
   common::add_seed_option(app, "--seed", seed, "Of the noise");
   app.add_option("--belief", belief_file,
                  "The planner's scene: where its objects are is what is measured first (default: drawn as\n"
@@ -55,7 +59,7 @@ int main(int argc, char** argv) {
   if (!level_result) return fail(level_result.error());
   auto scene_result = physics_pool::load_scene(scene_file);
   if (!scene_result) return fail(scene_result.error());
-  options.noise = {.sigma = physics_pool::velocity_noise(*level_result), .seed = seed};
+  options.noise = {.sigma = physics_pool::velocity_noise(*level_result), .slope = slope, .seed = seed};
   if (belief_file.empty()) {
     options.belief = physics_pool::perturb(*scene_result, *level_result, seed);
   } else {

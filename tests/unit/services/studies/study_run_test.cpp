@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "idl/text/yaml_fields.hpp"
+#include "services/studies/experiment/adaptive_study.hpp"
 #include "services/studies/experiment/grasping_study.hpp"
 #include "services/studies/experiment/push_study.hpp"
 #include "services/studies/experiment/study.hpp"
@@ -316,6 +317,67 @@ TEST_F(PushStudyRun, OneRunHasNoInterval) {
 TEST_F(PushStudyRun, RefusesWhatItDoesNotHave) {
   EXPECT_THROW(set_options(*sut, {"--levels", "low"}), CLI::ParseError);
   EXPECT_THROW(set_options(*sut, {"--jobs", "2"}), CLI::ParseError);  // times are measured
+}
+
+class AdaptiveStudyRun : public StudyRun {
+ protected:
+  const Loaded sut = study(&read_adaptive_study,
+                           "planner: {rollouts: 2, sigma: [0.02, 0.02, 0.1, 0], limit: [0.5, 0.5, 1, 0.05]}\n"
+                           "adaptive: {sequences: 2, most_actions: 2, samples: 2, iterations: 0, max_actions: 2}\n",
+                           R"(
+title: tiny and adaptive
+parameters: parameters.yaml
+tasks: [wide, strip]
+methods: [tampc, slow-mpc]
+levels: [0, 0.1]
+seeds: {first: 1, last: 2}
+thesis: {wide: {tampc: much}}
+)");
+};
+
+TEST_F(AdaptiveStudyRun, PairsMethodsOnScenesAndTellsOfEveryChoice) {
+  const StudyReport report = finished(*sut).report;
+  const json& result = report.json;
+  ASSERT_EQ(result["rows"].size(), 8u);
+  ASSERT_EQ(result["runs"].size(), 16u);
+  for (const json& row : result["rows"]) {
+    EXPECT_EQ(row["runs"], 2);
+    expect_share(row);
+    const bool is_thesis = row["task"] == "wide" && row["method"] == "tampc";
+    EXPECT_EQ(row["thesis"], is_thesis ? "much" : "-");
+    EXPECT_GE(row["total_seconds"].get<double>(),
+              row["planning_seconds"].get<double>() +
+                  result["seconds_per_action"].get<double>() * row["actions"].get<double>() - 1e-9);
+  }
+  for (const json& run : result["runs"]) {
+    ASSERT_EQ(run["way"].size(), run["actions"].get<std::size_t>());
+    const bool considers = run["method"] == "tampc";
+    EXPECT_EQ(run["way"][0]["considered"].size(), considers ? 2u : 1u);
+    // Equal scenes: the same straight way, in one action and in two.
+    if (considers)
+      EXPECT_NEAR(run["way"][0]["considered"][0]["speed"], 2 * run["way"][0]["considered"][1]["speed"].get<double>(),
+                  1e-12);
+  }
+  expect_narrow(report.table);
+  EXPECT_EQ(sut->figure(result).size(), 4u);
+}
+
+TEST_F(AdaptiveStudyRun, NumbersDoNotDependOnJobs) {
+  set_options(*sut, {"--tasks", "strip", "--jobs", "1"});
+  const json one = finished(*sut).report.json;
+  set_options(*sut, {"--tasks", "strip", "--jobs", "3"});
+  EXPECT_EQ(without_times(finished(*sut).report.json), without_times(one));
+}
+
+TEST_F(AdaptiveStudyRun, TakesOtherTasksMethodsLevelsAndParameters) {
+  set_options(*sut, {"--seeds", "1", "--tasks", "changing", "--methods", "uampc", "--levels", "0.05", "--set",
+                     "adaptive.max_actions=1"});
+  const json result = finished(*sut).report.json;
+  ASSERT_EQ(result["runs"].size(), 1u);
+  EXPECT_EQ(result["runs"][0]["task"], "changing");
+  EXPECT_EQ(result["runs"][0]["method"], "uampc");
+  EXPECT_EQ(result["runs"][0]["actions"], 1);
+  EXPECT_THROW(set_options(*sut, {"--tasks", "narrow"}), CLI::ParseError);
 }
 
 class TimedOutPushRun : public StudyRun {

@@ -72,6 +72,7 @@ control: {many_iterations: 24, few_iterations: 25, deviation_threshold: 26, init
           few_iterations_max: 30, obstruction_patience: 31,
           timeout: 29.5, max_rollouts: 37, close_hand: false}
 mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straight_speed: 0.36}
+adaptive: {sequences: 41, least_actions: 2, most_actions: 42, samples: 43, iterations: 44, noise: 0.45, rest: 0.46, value: printed, max_actions: 47}
 )");
   EXPECT_EQ(sut.planner.step_duration, 0.5);
   EXPECT_EQ(sut.controller.control.step_duration, 0.5);
@@ -125,6 +126,22 @@ mpc: {horizon: 32, first_iterations: 33, iterations: 34, max_actions: 35, straig
   EXPECT_EQ(sut.controller.mpc.straight_speed, 0.36);
   EXPECT_EQ(sut.controller.mpc.step_duration, 0.5);
   EXPECT_EQ(sut.limits.rollouts, 37u);
+  EXPECT_EQ(sut.controller.adaptive, (planners::AdaptiveOptions{.sequences = 41,
+                                                                .least_actions = 2,
+                                                                .most_actions = 42,
+                                                                .samples = 43,
+                                                                .iterations = 44,
+                                                                .noise = 0.45,
+                                                                .rest = 0.46,
+                                                                .value = planners::AdaptiveOptions::Value::kPrinted,
+                                                                .step_duration = 0.5,
+                                                                .max_actions = 47}));
+}
+
+TEST(Parameters, OfAdaptiveControlAreThoseOfTheCode) {
+  const auto result = load_parameters(std::filesystem::path(JOSTLE_SOURCE_DIR) / "experiments/adaptive.yaml");
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->controller.adaptive, planners::AdaptiveOptions{});
 }
 
 // experiments/pushing.yaml says what the code's defaults of pushing are.
@@ -177,6 +194,9 @@ const std::vector<Case> kCases{
      "planner: {sigma: [1, 2]}\n",
      {"p.yaml", "planner.sigma", "got 2 numbers", "4 of planner.limit"}},
     {"NoHorizon", "mpc: {horizon: 0}\n", {"p.yaml", "mpc.horizon", "got 0", "1 to"}},
+    {"FewerThanTheFewest",
+     "adaptive: {least_actions: 5, most_actions: 4}\n",
+     {"p.yaml: adaptive.least_actions", "got 5", "at most adaptive.most_actions, 4"}},
     {"NoActions", "mpc: {max_actions: 0}\n", {"p.yaml", "mpc.max_actions", "got 0", "1 to"}},
     {"UnknownMpcKey", "mpc: {steps: 3}\n", {"p.yaml:1", "mpc.steps", "unknown key", "horizon"}},
     {"NaNTimeout", "control: {timeout: .nan}\n", {"p.yaml:1", "control.timeout", "nan", "finite"}},

@@ -74,11 +74,11 @@ std::vector<Part> parts_of_world(const RunOptions& options, const std::filesyste
       break;
     }
     case Arm::Kind::kSim:
-      parts.push_back(part("the simulated world", "sim",
-                           simulating({scene.string(), "--belief", belief.string(), "--uncertainty",
-                                       physics_pool::to_string(options.level), "--seed", std::to_string(options.seed),
-                                       "--noise", fmt::format("{}", options.noise), "--rate",
-                                       fmt::format("{}", options.rate)})));
+      parts.push_back(
+          part("the simulated world", "sim",
+               simulating({scene.string(), "--belief", belief.string(), "--uncertainty",
+                           physics_pool::to_string(options.level), "--seed", std::to_string(options.seed), "--noise",
+                           fmt::format("{}", options.noise), "--rate", fmt::format("{}", options.rate)})));
       break;
   }
   return parts;

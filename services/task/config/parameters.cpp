@@ -51,11 +51,11 @@ void read(const YAML::Node& root, const std::string& origin, Parameters& paramet
     }
   };
   yaml::Fields fields(root, "", origin);
-  for (const auto& [section, keys] : sections) {
-    if (section.empty()) {
-      read_section(fields, keys);
+  for (const auto& section : sections) {
+    if (section.first.empty()) {
+      read_section(fields, section.second);
     } else {
-      fields.section(section.c_str(), false, [&](yaml::Fields& in) { read_section(in, keys); });
+      fields.section(section.first.c_str(), false, [&](yaml::Fields& in) { read_section(in, section.second); });
     }
   }
   fields.finish();

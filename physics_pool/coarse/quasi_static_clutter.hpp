@@ -58,6 +58,9 @@ class QuasiStaticClutter {
   ///          nothing drives, a mesh, a tilted box; says which
   static Result<QuasiStaticClutter> make(const Scene& scene, const ClutterOptions& options = {});
 
+  /// Sets what is fitted, from the next step on; the scene stays.
+  void set_options(const ClutterOptions& options) { options_ = options; }
+
   /// Moves x by one control step: a pure function of its arguments. Heights and tilts stay as they are, but for objects
   /// that leave the surface, which fall below it and out of the way. `v` becomes the last substep's velocities.
   /// `u` [nu], m/s and rad/s, `duration` in s. x has the sizes of the scene's states. Numbers that are not finite stay

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
+#include <thread>
 
 namespace jostle::planners {
 
@@ -54,6 +56,39 @@ Result<BatchReply> Search::run(const RolloutBatch& batch) {
   return reply_result;
 }
 
+Result<std::vector<BatchReply>> Search::run_in_order(std::span<const RolloutBatch> batches) {
+  if (std::chrono::steady_clock::now() >= deadline_) return Error{Code::kDeadline, "plan: out of time"};
+  for (const RolloutBatch& batch : batches) {
+    best_.rollouts += batch.samples;
+    if (problem_.rollouts_asked_for) *problem_.rollouts_asked_for += batch.samples;
+  }
+  std::vector<std::stop_source> stops(batches.size());
+  std::vector<std::optional<Result<BatchReply>>> results(batches.size());
+  const auto stop_from = [&stops](std::size_t first) {
+    for (std::size_t i = first; i < stops.size(); ++i) stops[i].request_stop();
+  };
+  {
+    const std::stop_callback on_stop(stop_, [&] { stop_from(0); });
+    std::vector<std::jthread> waiting;
+    for (std::size_t i = 0; i < batches.size(); ++i) {
+      waiting.emplace_back([&, i] {
+        results[i] = pool_.run(batches[i], deadline_, stops[i].get_token());
+        if (!*results[i] || succeeded(**results[i])) stop_from(i + 1);
+      });
+    }
+  }
+  std::vector<BatchReply> replies(batches.size());
+  for (std::size_t i = 0; i < batches.size(); ++i) {
+    if (!*results[i]) return results[i]->error();
+    replies[i] = std::move(*results[i]).value();
+    for (const RolloutOutcome& outcome : replies[i].outcomes) {
+      if (outcome.end == End::kDiverged) divergence_ = outcome.reason;
+    }
+    if (succeeded(replies[i])) break;
+  }
+  return replies;
+}
+
 void Search::adopt(const RolloutBatch& batch, const BatchReply& reply) {
   const RolloutOutcome* winner = winner_of(reply);
   if (!winner) return;
@@ -98,6 +133,10 @@ Result<void> Search::attempt(const std::function<Result<void>()>& step) {
 Result<Plan> Search::until_done(const std::function<Result<void>()>& improve) {
   if (auto ok = attempt([this] { return consider(problem_.initial); }); !ok) return ok.error();
   report();
+  return improve_until_done(improve);
+}
+
+Result<Plan> Search::improve_until_done(const std::function<Result<void>()>& improve) {
   while (best_.iterations < problem_.iterations && best_.rollouts < problem_.rollouts && !best_.at_goal) {
     if (auto ok = attempt(improve); !ok) return ok.error();
     ++best_.iterations;

@@ -31,6 +31,11 @@ class Search {
   /// Runs a batch and counts its rollouts, also if it fails.
   Result<physics_pool::BatchReply> run(const physics_pool::RolloutBatch& batch);
 
+  /// Runs batches side by side, each in a thread that waits for the pool. Once one has succeeded those behind it are
+  /// cancelled, since nobody will ask for them, and their replies are empty: what is returned does not depend on who
+  /// was faster. Counts the rollouts of all.
+  Result<std::vector<physics_pool::BatchReply>> run_in_order(std::span<const physics_pool::RolloutBatch> batches);
+
   /// Keeps the winner of a batch, if it has one.
   void adopt(const physics_pool::RolloutBatch& batch, const physics_pool::BatchReply& reply);
 
@@ -43,6 +48,9 @@ class Search {
   /// candidate, at the cost that full physics gives it.
   /// Errors   those of `improve`, and of Planner::plan.
   Result<Plan> until_done(const std::function<Result<void>()>& improve);
+
+  /// Does the same without scoring the initial sequence first: `improve` does what it wants with it.
+  Result<Plan> improve_until_done(const std::function<Result<void>()>& improve);
 
  private:
   Result<void> attempt(const std::function<Result<void>()>& step);

@@ -67,6 +67,10 @@ const std::vector<Room> kArrows{
     {"physics_pool/render/", {"idl/types/", "idl/files/", "physics_pool/scene/", "physics_pool/local/"}},
     {"robot_bridge/", {"idl/types/"}},
     {"perception/", {"idl/types/"}},
+    // Only this planner knows cheaper physics than the Pool's.
+    {"planners/guided/",
+     {"idl/types/", "physics_pool/task/", "physics_pool/objective/", "physics_pool/api/", "physics_pool/sampling/",
+      "physics_pool/coarse/", "planners/api/", "planners/pbsto/", "planners/search/"}},
     {"planners/",
      {"idl/types/", "physics_pool/task/", "physics_pool/objective/", "physics_pool/api/", "robot_bridge/api/",
       "perception/api/"}},

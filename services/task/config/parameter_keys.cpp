@@ -127,6 +127,23 @@ void add_planner(std::vector<ParameterKey>& keys) {
       [](auto& p) -> auto& { return p.planner.screening_time_step; }));
 }
 
+void add_guidance(std::vector<ParameterKey>& keys) {
+  keys.push_back(key(
+      "planner.guidance", "", 0, 100'000,
+      "Candidates per iteration that coarse physics ranks, and of which the engine judges the few best; for a hand "
+      "that "
+      "moves in the plane. 0: Alg. 1 without guidance.",
+      [](auto& p) -> auto& { return p.guidance.candidates; }));
+  keys.push_back(key(
+      "planner.guidance_generations", "", 1, 100,
+      "Generations that those candidates come in; later ones are drawn around the best of those before.",
+      [](auto& p) -> auto& { return p.guidance.generations; }));
+  keys.push_back(key(
+      "planner.guidance_judged", "", 1, 8,
+      "Candidates that the engine judges in the first iteration, side by side; doubled in the next, up to 8.",
+      [](auto& p) -> auto& { return p.guidance.judged; }));
+}
+
 // A phrase of the catalogue as a sentence; symbols such as w_a keep their case.
 std::string sentence(std::string text) {
   const bool is_word = text.size() > 1 && std::islower(static_cast<unsigned char>(text[1])) != 0;
@@ -287,6 +304,7 @@ std::vector<ParameterKey> parameter_keys() {
       "Success counts from this action of a plan on (n_min of Alg. 1; thesis: 2).",
       [](auto& p) -> auto& { return p.planner.min_steps; }));
   add_planner(keys);
+  add_guidance(keys);
   add_objective(keys);
   add_control(keys);
   add_mpc(keys);

@@ -11,12 +11,15 @@
 
 #include "idl/types/result.hpp"
 #include "planners/controllers/catalogue.hpp"
+#include "planners/guided/guided.hpp"
 #include "planners/pbsto/pbsto.hpp"
 
 namespace jostle::task {
 
 struct Parameters {
   planners::PbstoOptions planner;
+  planners::GuidanceOptions
+      guidance;  ///< planner.guidance…: with candidates, `planner` gives noise, limits and n_min only
   physics_pool::Objective objective = physics_pool::Objective::standard();
   planners::ControllerOptions controller;
   planners::RunLimits limits;

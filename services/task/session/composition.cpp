@@ -1,10 +1,31 @@
 #include "services/task/session/composition.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "physics_pool/local/simulator.hpp"
 
 namespace jostle::task {
+
+Result<std::unique_ptr<planners::Planner>> make_planner(const planners::ControllerKind& controller,
+                                                        physics_pool::Pool& pool, const physics_pool::Scene& belief,
+                                                        const physics_pool::TaskGeometry& geometry,
+                                                        const Parameters& parameters,
+                                                        planners::OnProgress on_progress) {
+  const int guidance = parameters.guidance.candidates;
+  if (guidance == 0) {
+    return planners::make_planner(controller, pool, geometry, parameters.planner, parameters.controller,
+                                  std::move(on_progress));
+  }
+  if (controller.planner) {
+    return invalid("planner.guidance", fmt::format("{} candidates for the controller '{}'", guidance, controller.name),
+                   "0 for controllers that have a planner of their own");
+  }
+  auto guided_result =
+      planners::GuidedPlanner::make(pool, belief, parameters.planner, parameters.guidance, std::move(on_progress));
+  if (!guided_result) return guided_result.error();
+  return std::unique_ptr<planners::Planner>(std::move(guided_result).value());
+}
 
 Result<Composition> Composition::make(RunParts parts, physics_pool::Pool& pool) {
   Composition run;
@@ -19,6 +40,10 @@ Result<Composition> Composition::make(RunParts parts, physics_pool::Pool& pool) 
   auto believed_result = physics_pool::World::compile(parts.belief);
   if (!believed_result) return believed_result.error();
   run.believed_ = std::move(believed_result).value();
+  // Whether there can be such a planner for this world is told before anything runs.
+  if (auto ok = make_planner(*run.controller_, pool, parts.belief, run.geometry(), parts.parameters, {}); !ok) {
+    return ok.error();
+  }
   run.parts_ = std::move(parts);
   run.parts_.parameters.controller.set_plan_only(run.parts_.plan_only);
   return run;
@@ -26,10 +51,12 @@ Result<Composition> Composition::make(RunParts parts, physics_pool::Pool& pool) 
 
 Result<planners::Outcome> Composition::perform(robot_bridge::Robot& robot, perception::ObjectSource& objects,
                                                const Watch& watch, std::stop_token stop) {
-  const auto optimizer = planners::make_planner(*controller_, *pool_, geometry(), parts_.parameters.planner,
-                                                parts_.parameters.controller, watch.on_progress);
-  const std::unique_ptr<planners::Planner> around = watch.around_planner ? watch.around_planner(*optimizer) : nullptr;
-  planners::ControlSetup setup{.planner = around ? *around : *optimizer,
+  auto planner_result =
+      make_planner(*controller_, *pool_, parts_.belief, geometry(), parts_.parameters, watch.on_progress);
+  if (!planner_result) return planner_result.error();
+  planners::Planner& planner = **planner_result;
+  const std::unique_ptr<planners::Planner> around = watch.around_planner ? watch.around_planner(planner) : nullptr;
+  planners::ControlSetup setup{.planner = around ? *around : planner,
                                .robot = robot,
                                .objects = objects,
                                .geometry = geometry(),

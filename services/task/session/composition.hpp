@@ -16,6 +16,14 @@
 
 namespace jostle::task {
 
+/// Makes the planner that a controller and parameters ask for: the controller's own, Alg. 1, or one that coarse physics
+/// guides. Pool and geometry outlive it.
+/// Error kInvalidArgument: guidance for a controller or a robot that it is not for; names the field
+Result<std::unique_ptr<planners::Planner>> make_planner(const planners::ControllerKind& controller,
+                                                        physics_pool::Pool& pool, const physics_pool::Scene& belief,
+                                                        const physics_pool::TaskGeometry& geometry,
+                                                        const Parameters& parameters, planners::OnProgress on_progress);
+
 /// What a run is made of.
 struct RunParts {
   physics_pool::Scene belief;  ///< the planning world

@@ -18,6 +18,7 @@
 #include "services/studies/bench/benchmarks.hpp"
 #include "services/studies/bench/chaos.hpp"
 #include "services/studies/bench/cheap_physics.hpp"
+#include "services/studies/bench/first_plan.hpp"
 #include "services/studies/bench/pool_timeline.hpp"
 #include "services/studies/bench/record.hpp"
 
@@ -208,6 +209,42 @@ class CheapPhysicsBenchmark final : public Benchmark {
   std::string plot_;
 };
 
+class FirstPlan final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--worlds", options_.worlds, "Worlds, one run of each side in each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    common::add_seed_option(app, "--seed", options_.first_seed, "Seed of the first world; the next ones follow");
+    app.add_option("--objects", options_.objects, "Objects beside the target")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 40));
+    app.add_option("--table", options_.table, "Side of the table, m; 0: as dense as in Sec. 3.3.1")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 10.0));
+    app.add_option("--workers", options_.workers, "Threads of the pool")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--timeout", options_.timeout, "Seconds of one run")
+        ->capture_default_str()
+        ->check(CLI::Range(1.0, 1e6));
+    app.add_option("--guidance", options_.guidance, "Candidates per iteration of the side with guidance")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.line = start.line;
+    return exit_code(bench_first_plan(options_, json, common::data_file("experiments/grasping.yaml"), start.stop));
+  }
+
+ private:
+  FirstPlanOptions options_;
+};
+
 class PoolTimeline final : public Benchmark {
  public:
   using Benchmark::Benchmark;
@@ -328,6 +365,8 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
       measure_coarse_models);
   add(ratio, "early-stop", "a batch that stops its losers against one that does not", "2 min", kNothing, 5,
       measure_early_stop);
+  add(std::type_identity<FirstPlan>(), "first-plan",
+      "first plans and re-plans of grasps in fresh worlds, without and with guidance", "an hour", kNothing);
   add(ratio, "hosts", "between two hosts: round trip and throughput, protected against unprotected", "5 min", kDomain,
       9, measure_hosts);
   add(of_workers, "hosts-scheduling", "waiting workers on several hosts against workers that never idle", "1 min",

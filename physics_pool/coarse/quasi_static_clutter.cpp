@@ -77,10 +77,7 @@ Result<QuasiStaticClutter> QuasiStaticClutter::make(const Scene& scene, const Cl
                              .v = layout.objects[i].v});
   }
   model.objects_.resize(model.bodies_.size());
-  const std::size_t most = kContactsPerBody * (model.bodies_.size() + 4);
-  model.contacts_.reserve(most);
-  model.before_.reserve(most);
-  model.queue_.reserve(model.bodies_.size());
+  model.most_contacts_ = kContactsPerBody * (model.bodies_.size() + 4);
   return model;
 }
 
@@ -182,6 +179,10 @@ void QuasiStaticClutter::advance(State& x, std::span<const double> u, double dur
     object.gone = q[2] < body.rest_height - kForeseen * 10;
     object.moved = false;
   }
+  // Here, and not when it is made: a copy of an empty vector has no room.
+  contacts_.reserve(most_contacts_);
+  before_.reserve(most_contacts_);
+  queue_.reserve(bodies_.size());
   contacts_.clear();
   const double way = approach_ * duration;
   const int substeps =
@@ -305,7 +306,7 @@ void QuasiStaticClutter::find_contacts() {
 // Notes contacts of object a with object b, with a fixture (b = -2 - its number) or with the robot's piece; or, without
 // an object (a = -1), of a piece with fixture b.
 void QuasiStaticClutter::touch(int a, int b, int piece, const Touches& touches) {
-  for (int t = 0; t < touches.count && contacts_.size() < contacts_.capacity(); ++t) {
+  for (int t = 0; t < touches.count && contacts_.size() < most_contacts_; ++t) {
     const Touch& at = touches.values[index(t)];
     Pressing contact;
     contact.a = a;

@@ -151,6 +151,7 @@ class QuasiStaticClutter {
   std::array<double, kMostJoints> q_{}, v_{}, free_{}, held_{};  // joints; held_: force of the limit they are at
   std::array<Eigen::Vector2d, kMostJoints> arrows_{};            // of a slide: its direction; of a hinge: its place
   std::vector<Pressing> contacts_, before_;
+  std::size_t most_contacts_ = 0;
   std::vector<int> queue_;
   double margin_ = 0.0, approach_ = 0.0, h_ = 0.0;
 };

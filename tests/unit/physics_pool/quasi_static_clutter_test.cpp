@@ -62,6 +62,16 @@ TEST(QuasiStaticClutter, DiscGoesAlongFromTheTouchOn) {
   EXPECT_NEAR(object(scene, x, 0).yaw(), 0.0, 1e-9);
 }
 
+TEST(QuasiStaticClutter, CopyMovesWhatTheOriginalMoves) {
+  const Scene scene = pushing_scene(-0.1, 0.0, {slider_disc("s", 0.0, 0.0)});
+  const QuasiStaticClutter original = model_of(scene);
+  QuasiStaticClutter copy = original;
+  State x = initial_state(scene);
+  copy.advance(x, std::vector<double>{0.05, 0.0}, 2.0);
+  EXPECT_EQ(x, advanced(scene, {0.05, 0.0}, 2.0));
+  EXPECT_GT(object(scene, x, 0).position()[0], 0.01);
+}
+
 // Without friction at the contact the force is along its normal, and the limit surface's normal gives the motion:
 // v = u/(1 + b^2/c^2) and omega = v·b/c^2 for a push at distance b from the centre (Lynch 1992).
 TEST(QuasiStaticClutter, FrictionlessPushTurnsABoxAsTheLimitSurfaceSays) {

@@ -33,9 +33,8 @@ struct GuidanceOptions {
 class GuidedPlanner final : public Planner {
  public:
   /// Keeps a reference to the pool, which must outlive it. `options`: noise, limits, n_min and the length of a step.
-  /// Errors   kInvalidArgument  a scene without a hand that moves in the plane and turns, or that the coarse model
-  /// cannot
-  ///          show
+  /// Errors   kInvalidArgument  a scene without a hand that moves in the plane and turns, or one that the coarse
+  ///                             model cannot show
   static Result<std::unique_ptr<GuidedPlanner>> make(physics_pool::Pool& pool, const physics_pool::Scene& scene,
                                                      const PbstoOptions& options, const GuidanceOptions& guidance,
                                                      OnProgress on_progress = {});

@@ -140,9 +140,8 @@ std::string to_text(const std::vector<FirstPlanSide>& sides) {
   for (const FirstPlanSide& side : sides) {
     const std::vector<double> first = seconds_of(side.first), again = seconds_of(side.replans);
     text += fmt::format(
-        "{:<17} {} of {} worlds solved; first plan {:.2f} s (90 %: {:.2f} s), {} reach the target; {} re-plans, {:.2f} "
-        "s "
-        "(90 %: {:.2f} s)\n",
+        "{:<17} {} of {} worlds solved; first plan {:.2f} s (90 %: {:.2f} s), {} reach the target; {} re-plans, "
+        "{:.2f} s (90 %: {:.2f} s)\n",
         side.name, side.solved, side.worlds, common::median(first), common::quantile(first, 0.9), side.planned,
         again.size(), common::median(again), common::quantile(again, 0.9));
   }

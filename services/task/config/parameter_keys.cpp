@@ -131,8 +131,7 @@ void add_guidance(std::vector<ParameterKey>& keys) {
   keys.push_back(key(
       "planner.guidance", "", 0, 100'000,
       "Candidates per iteration that coarse physics ranks, and of which the engine judges the few best; for a hand "
-      "that "
-      "moves in the plane. 0: Alg. 1 without guidance.",
+      "that moves in the plane. 0: Alg. 1 without guidance.",
       [](auto& p) -> auto& { return p.guidance.candidates; }));
   keys.push_back(key(
       "planner.guidance_generations", "", 1, 100,

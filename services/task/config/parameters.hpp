@@ -18,8 +18,8 @@ namespace jostle::task {
 
 struct Parameters {
   planners::PbstoOptions planner;
-  planners::GuidanceOptions
-      guidance;  ///< planner.guidance…: with candidates, `planner` gives noise, limits and n_min only
+  /// planner.guidance…: with candidates, `planner` gives noise, limits and n_min only.
+  planners::GuidanceOptions guidance;
   physics_pool::Objective objective = physics_pool::Objective::standard();
   planners::ControllerOptions controller;
   planners::RunLimits limits;

@@ -7,26 +7,6 @@
 
 namespace jostle::task {
 
-Result<std::unique_ptr<planners::Planner>> make_planner(const planners::ControllerKind& controller,
-                                                        physics_pool::Pool& pool, const physics_pool::Scene& belief,
-                                                        const physics_pool::TaskGeometry& geometry,
-                                                        const Parameters& parameters,
-                                                        planners::OnProgress on_progress) {
-  const int guidance = parameters.guidance.candidates;
-  if (guidance == 0) {
-    return planners::make_planner(controller, pool, geometry, parameters.planner, parameters.controller,
-                                  std::move(on_progress));
-  }
-  if (controller.planner) {
-    return invalid("planner.guidance", fmt::format("{} candidates for the controller '{}'", guidance, controller.name),
-                   "0 for controllers that have a planner of their own");
-  }
-  auto guided_result =
-      planners::GuidedPlanner::make(pool, belief, parameters.planner, parameters.guidance, std::move(on_progress));
-  if (!guided_result) return guided_result.error();
-  return std::unique_ptr<planners::Planner>(std::move(guided_result).value());
-}
-
 Result<Composition> Composition::make(RunParts parts, physics_pool::Pool& pool) {
   Composition run;
   run.pool_ = &pool;
@@ -34,16 +14,17 @@ Result<Composition> Composition::make(RunParts parts, physics_pool::Pool& pool) 
   auto controller_result = planners::find_controller(parts.controller, parts.belief);
   if (!controller_result) return controller_result.error();
   run.controller_ = *controller_result;
+  if (const int candidates = parts.parameters.guidance.candidates; candidates > 0 && run.controller_->planner) {
+    return invalid("planner.guidance",
+                   fmt::format("{} candidates for the controller '{}'", candidates, run.controller_->name),
+                   "0 for controllers that have a planner of their own");
+  }
   auto world_result = pool.load(parts.belief);
   if (!world_result) return world_result.error();
   run.world_ = *world_result;
   auto believed_result = physics_pool::World::compile(parts.belief);
   if (!believed_result) return believed_result.error();
   run.believed_ = std::move(believed_result).value();
-  // Whether there can be such a planner for this world is told before anything runs.
-  if (auto ok = make_planner(*run.controller_, pool, parts.belief, run.geometry(), parts.parameters, {}); !ok) {
-    return ok.error();
-  }
   run.parts_ = std::move(parts);
   run.parts_.parameters.controller.set_plan_only(run.parts_.plan_only);
   return run;
@@ -51,12 +32,9 @@ Result<Composition> Composition::make(RunParts parts, physics_pool::Pool& pool) 
 
 Result<planners::Outcome> Composition::perform(robot_bridge::Robot& robot, perception::ObjectSource& objects,
                                                const Watch& watch, std::stop_token stop) {
-  auto planner_result =
-      make_planner(*controller_, *pool_, parts_.belief, geometry(), parts_.parameters, watch.on_progress);
-  if (!planner_result) return planner_result.error();
-  planners::Planner& planner = **planner_result;
-  const std::unique_ptr<planners::Planner> around = watch.around_planner ? watch.around_planner(planner) : nullptr;
-  planners::ControlSetup setup{.planner = around ? *around : planner,
+  const std::unique_ptr<planners::Planner> planner = make_planner(watch.on_progress);
+  const std::unique_ptr<planners::Planner> around = watch.around_planner ? watch.around_planner(*planner) : nullptr;
+  planners::ControlSetup setup{.planner = around ? *around : *planner,
                                .robot = robot,
                                .objects = objects,
                                .geometry = geometry(),
@@ -68,6 +46,18 @@ Result<planners::Outcome> Composition::perform(robot_bridge::Robot& robot, perce
     setup.make_feasible = [this](const State& x) { return moved_apart(x); };
   }
   return controller_->run(setup, parts_.parameters.controller, watch.on_event, std::move(stop));
+}
+
+std::unique_ptr<planners::Planner> Composition::make_planner(const planners::OnProgress& on_progress) const {
+  const Parameters& parameters = parts_.parameters;
+  if (parameters.guidance.candidates > 0) {
+    auto guided_result =
+        planners::GuidedPlanner::make(*pool_, parts_.belief, parameters.planner, parameters.guidance, on_progress);
+    if (guided_result) return std::move(guided_result).value();
+    spdlog::warn("planned without guidance: {}", guided_result.error().message);
+  }
+  return planners::make_planner(*controller_, *pool_, geometry(), parameters.planner, parameters.controller,
+                                on_progress);
 }
 
 Result<State> Composition::moved_apart(const State& x) const {

@@ -16,14 +16,6 @@
 
 namespace jostle::task {
 
-/// Makes the planner that a controller and parameters ask for: the controller's own, Alg. 1, or one that coarse physics
-/// guides. Pool and geometry outlive it.
-/// Error kInvalidArgument: guidance for a controller or a robot that it is not for; names the field
-Result<std::unique_ptr<planners::Planner>> make_planner(const planners::ControllerKind& controller,
-                                                        physics_pool::Pool& pool, const physics_pool::Scene& belief,
-                                                        const physics_pool::TaskGeometry& geometry,
-                                                        const Parameters& parameters, planners::OnProgress on_progress);
-
 /// What a run is made of.
 struct RunParts {
   physics_pool::Scene belief;  ///< the planning world
@@ -67,6 +59,9 @@ class Composition {
  private:
   Composition() = default;
 
+  // The controller's own planner, Alg. 1, or one that coarse physics guides. A belief that coarse physics cannot show
+  // is planned for without guidance, and the log says why.
+  std::unique_ptr<planners::Planner> make_planner(const planners::OnProgress& on_progress) const;
   Result<State> moved_apart(const State& x) const;
 
   RunParts parts_;

@@ -66,6 +66,7 @@ const std::vector<Room> kArrows{
       "physics_pool/api/"}},
     {"physics_pool/render/", {"idl/types/", "idl/files/", "physics_pool/scene/", "physics_pool/local/"}},
     {"robot_bridge/", {"idl/types/"}},
+    {"perception/camera/", {"idl/types/", "idl/files/", "idl/text/"}},
     {"perception/", {"idl/types/"}},
     // Only this planner knows cheaper physics than the Pool's.
     {"planners/guided/",

@@ -45,6 +45,7 @@ Detector::Detector(const DetectorOptions& options) : parts_(std::make_unique<Par
   apriltag_detector_add_family_bits(&detector, parts_->family.get(), options.correctable_bits);
   detector.quad_decimate = static_cast<float>(options.decimation);
   detector.decode_sharpening = options.sharpening;
+  detector.qtp.min_white_black_diff = options.least_contrast;
   detector.nthreads = options.threads;
 }
 

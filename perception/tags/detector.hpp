@@ -11,12 +11,16 @@
 namespace jostle::perception {
 
 struct DetectorOptions {
-  /// Quads are looked for in an image this much smaller: faster, and small tags are missed. >= 1
-  double decimation = 1.0;
+  /// Quads are looked for in an image this much smaller: faster, and small tags are missed (`jostle bench tags`). Edges
+  /// are found and bits are read in the whole image. >= 1
+  double decimation = 1.5;
   /// Bits of a tag's 36 that may be wrong, 0 to 2. More finds more, and more often what is no tag.
   int correctable_bits = 1;
   /// What the pattern is sharpened by before its bits are read; helps small tags.
   double sharpening = 0.25;
+  /// Where shades differ by less within some pixels, there is nothing to look at: with libapriltag's 5 the noise of a
+  /// camera is looked at everywhere, which takes most of the time. Shades, 0 to 255.
+  int least_contrast = 40;
   int threads = 1;
 };
 

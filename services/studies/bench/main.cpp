@@ -21,6 +21,7 @@
 #include "services/studies/bench/first_plan.hpp"
 #include "services/studies/bench/pool_timeline.hpp"
 #include "services/studies/bench/record.hpp"
+#include "services/studies/bench/tags.hpp"
 
 namespace jostle::studies {
 namespace {
@@ -328,6 +329,31 @@ class Record : public Benchmark {
   int pairs_ = 9;
 };
 
+class Tags final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--frames", options_.frames, "Frames of 15 tags at each of three distances")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    common::add_seed_option(app, "--seed", options_.seed, "Of the tags' poses and the images' noise");
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_tags(options_));
+  }
+
+  const char* unit() const override { return "frames"; }
+
+ private:
+  TagsOptions options_;
+};
+
 /// The other process of `record`.
 class Publisher final : public Record {
  public:
@@ -388,6 +414,9 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
       measure_round_trip);
   add(of_workers, "scheduling", "waiting workers against workers that never idle", "30 s", kDomain, 5,
       measure_scheduling);
+  add(std::type_identity<Tags>(), "tags",
+      "poses of tags in rendered images: errors, flips, honest covariances, time beside libapriltag's defaults",
+      "1 min", kNothing);
   add(ratio, "unplugged", "work one of whose two hosts is unplugged for a while against work left alone", "7 min",
       kDomain, 5, measure_unplugged);
   add(std::type_identity<EchoServer>(), "echo", "", "", kDomain);

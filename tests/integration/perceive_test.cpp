@@ -30,6 +30,25 @@ TEST_P(Perceive, RunGraspsWhatMotionCaptureSeesAndReplaysBitEqual) {
 INSTANTIATE_TEST_SUITE_P(, Perceive, ::testing::Values("sim", "ur-sim"),
                          [](const auto& arm) { return std::string(arm.param) == "sim" ? "ByHand" : "ByArm"; });
 
+class PerceiveByCamera : public RunFixture {};
+
+TEST_F(PerceiveByCamera, RunGraspsWhatRenderedPixelsShow) {
+  const std::string report = folder.path() / "run.json";
+  const int code = finish({easy, "--objects", "camera-sim", "--workers", "2", "--parameters", plain, "--json", report});
+
+  ASSERT_EQ(code, 0) << run->err();
+  const auto result = nlohmann::json::parse(contents(report));
+  EXPECT_TRUE(result["success"]);
+  EXPECT_GT(result["actions"], 1);
+}
+
+TEST_F(PerceiveByCamera, WhatACameraCannotDoIsRefused) {
+  EXPECT_EQ(finish({easy, "--objects", "camera-sim", "--arm", "ur-sim"}), 2);
+  EXPECT_THAT(run->err(), HasSubstr("wanted --arm sim"));
+  EXPECT_EQ(finish({easy, "--objects", "camera-sim", "--uncertainty", "low"}), 2);
+  EXPECT_THAT(run->err(), HasSubstr("a camera sees what is there"));
+}
+
 class PerceiveTrouble : public RunFixture {};
 
 TEST_F(PerceiveTrouble, EyesThatAreGoneEndTheRunByTheirName) {
@@ -54,7 +73,7 @@ TEST_F(PerceiveTrouble, NobodyThereIsSaid) {
 
 TEST_F(PerceiveTrouble, WhatIsNoSensorIsRefused) {
   EXPECT_EQ(finish({easy, "--objects", "eyes"}), 2);
-  EXPECT_THAT(run->err(), HasSubstr("wanted sim, mocap-sim or mocap:HOST"));
+  EXPECT_THAT(run->err(), HasSubstr("wanted sim, mocap-sim, camera-sim or mocap:HOST"));
   EXPECT_EQ(finish({easy, "--objects", "mocap:10.0.0.1"}), 2);
   EXPECT_THAT(run->err(), HasSubstr("the arm's world is simulated"));
 }

@@ -29,10 +29,12 @@ Result<Arm> parse_arm(const std::string& text) {
 Result<Sensor> parse_sensor(const std::string& text) {
   constexpr std::string_view kMocap = "mocap:";
   if (text == "sim") return Sensor{};
+  if (text == "camera-sim") return Sensor{.kind = Sensor::Kind::kCameraSim, .host = {}};
   if (text == "mocap-sim") return Sensor{.kind = Sensor::Kind::kMocapSim, .host = {}};
   if (text.starts_with(kMocap) && text.size() > kMocap.size())
     return Sensor{.kind = Sensor::Kind::kMocap, .host = text.substr(kMocap.size())};
-  return Error{Code::kInvalidArgument, fmt::format("--objects: got '{}', wanted sim, mocap-sim or mocap:HOST", text)};
+  return Error{Code::kInvalidArgument,
+               fmt::format("--objects: got '{}', wanted sim, mocap-sim, camera-sim or mocap:HOST", text)};
 }
 
 std::vector<Part> parts_of_world(const RunOptions& options, const std::filesystem::path& scene,
@@ -50,7 +52,10 @@ std::vector<Part> parts_of_world(const RunOptions& options, const std::filesyste
   };
   std::vector<Part> parts;
   std::vector<std::string> seen_by;  // of what simulates the objects
-  if (options.sensor.kind != Sensor::Kind::kSim) {
+  if (options.sensor.kind == Sensor::Kind::kCameraSim) {
+    seen_by = {"--camera"};
+    parts.push_back(part("the eyes", "perceive", {"camera", "camera", "--scene", scene.string()}));
+  } else if (options.sensor.kind != Sensor::Kind::kSim) {
     const bool simulated = options.sensor.kind == Sensor::Kind::kMocapSim;
     const std::string host = simulated ? mocap_address(domain) : options.sensor.host;
     if (simulated) seen_by = {"--mocap", host};

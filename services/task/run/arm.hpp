@@ -32,15 +32,16 @@ Result<Arm> parse_arm(const std::string& text);
 /// What `--objects` names.
 struct Sensor {
   enum class Kind {
-    kSim,       ///< the simulated world itself says where objects are
-    kMocapSim,  ///< motion capture that is simulated, behind its own protocol
-    kMocap      ///< motion capture
+    kSim,        ///< the simulated world itself says where objects are
+    kMocapSim,   ///< motion capture that is simulated, behind its own protocol
+    kCameraSim,  ///< a camera that looks at rendered tags on the objects
+    kMocap       ///< motion capture
   };
   Kind kind = Kind::kSim;
   std::string host;  ///< of a motion capture's server
 };
 
-/// Reads "sim", "mocap-sim" or "mocap:HOST".
+/// Reads "sim", "mocap-sim", "camera-sim" or "mocap:HOST".
 /// Error kInvalidArgument.
 Result<Sensor> parse_sensor(const std::string& text);
 

@@ -81,7 +81,8 @@ int main(int argc, char** argv) {
   app.add_option(
          "--objects", objects,
          "Who sees the objects: sim, the simulated world itself; mocap-sim, a motion capture that is simulated;\n"
-         "mocap:HOST, one that speaks NatNet (docs/perception.md)")
+         "camera-sim, a camera that looks at rendered tags on the objects; mocap:HOST, a motion capture that speaks\n"
+         "NatNet (docs/perception.md)")
       ->capture_default_str();
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   if (options.pool == "threads" && options.workers == 0) {
@@ -100,6 +101,16 @@ int main(int argc, char** argv) {
   if (options.sensor.kind == Sensor::Kind::kMocap && options.arm.kind != Arm::Kind::kUr) {
     return fail({Code::kInvalidArgument,
                  "--objects: got " + objects + ", wanted sim or mocap-sim: the arm's world is simulated"},
+                common::kExitUsage);
+  }
+  if (options.sensor.kind == Sensor::Kind::kCameraSim && options.arm.kind != Arm::Kind::kSim) {
+    return fail({Code::kInvalidArgument,
+                 "--objects: got camera-sim with --arm " + arm + ", wanted --arm sim: only its world is rendered"},
+                common::kExitUsage);
+  }
+  if (options.sensor.kind == Sensor::Kind::kCameraSim && arguments.level != "none") {
+    return fail({Code::kInvalidArgument, "--uncertainty: got " + arguments.level +
+                                             " with --objects camera-sim, wanted none: a camera sees what is there"},
                 common::kExitUsage);
   }
   if (options.arm.kind != Arm::Kind::kSim && arguments.level != "none") {

@@ -22,6 +22,8 @@ class ObjectsOut {
   virtual ~ObjectsOut() = default;
   /// `time`: s of the clock that stamps are of.
   virtual void tell(const std::vector<perception::ObjectReading>& objects, double time) = 0;
+  /// Shows the true state of the world to who makes pictures of it.
+  virtual void show(const State& /*truth*/, double /*time*/) {}
 };
 
 /// Publishes states, and in standard forms poses and transforms.

@@ -66,6 +66,7 @@ void SimulatedWorld::publish() {
   rosgraph_msgs::msg::Clock clock;
   clock.clock(make_header(time).stamp());
   (void)clock_.write(clock);
+  objects_.show(truth, time);
   objects_.tell(object_readings(geometry.layout, seen), time);
   (void)joints_.write(joint_state_message(geometry.layout, truth, time));
 }

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cmath>
 #include <mutex>
 #include <set>
 
@@ -14,6 +15,7 @@
 #include "services/common/process/command_line.hpp"
 #include "services/common/process/program.hpp"
 #include "services/world/link/objects_out.hpp"
+#include "services/world/perceive/camera.hpp"
 
 namespace {
 
@@ -110,6 +112,22 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::IsMember({"host", "server"}));
   common::add_process_options(*mocap, process);
+  CameraOptions camera_options;
+  std::vector<double> at;
+  auto* camera =
+      app.add_subcommand("camera", "A camera of ROS 2 that sees AprilTags (36h11) on the tops of the objects");
+  camera->add_option("topic", camera_options.name, "Images come on TOPIC/image_raw, intrinsics on TOPIC/camera_info")
+      ->capture_default_str();
+  camera
+      ->add_option("--scene", camera_options.scene,
+                   "Scene file; its first object has tag 0, and so on, each as large as fits in whole millimetres")
+      ->required();
+  camera
+      ->add_option("--at", at,
+                   "Where the camera is in the world: x y z (m) and the quaternion w x y z; z looks forward, y down\n"
+                   "(default: above the middle of the surface, as the simulated camera)")
+      ->expected(7);
+  common::add_process_options(*camera, process);
   app.footer("Exit codes: 0 stopped by a signal, 2 bad input, 3 a part of the system failed.");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   common::die_with_parent(process.parent);
@@ -123,6 +141,17 @@ int main(int argc, char** argv) {
       {.name = "jostle_perceive", .domain = process.domain, .role = wire::Role::kRobot, .waits_for_server = true});
   if (!participant_result) return fail(participant_result.error());
   try {
+    if (camera->parsed()) {
+      if (!at.empty()) {
+        const double length = std::hypot(std::hypot(at[3], at[4]), std::hypot(at[5], at[6]));
+        if (!(std::abs(length - 1) < 0.01))
+          return fail(invalid("--at", fmt::format("a quaternion of length {}", length), "1"));
+        camera_options.X_WC = Pose{.position = {at[0], at[1], at[2]}, .orientation = {at[3], at[4], at[5], at[6]}};
+      }
+      if (auto ok = look_through_camera(*participant_result, camera_options, signal.token()); !ok)
+        return fail(ok.error());
+      return common::kExitOk;
+    }
     Sight sight(*participant_result, stamps == "server");
     auto client_result = natnet::Client::start(options, [&](const natnet::Seen& seen) { sight.look(seen); });
     if (!client_result) return fail(client_result.error());

@@ -12,6 +12,7 @@
 #include "services/common/process/command_line.hpp"
 #include "services/common/process/domain_claim.hpp"
 #include "services/common/process/program.hpp"
+#include "services/world/camera/camera_out.hpp"
 #include "services/world/link/simulated_world.hpp"
 
 int main(int argc, char** argv) {
@@ -19,6 +20,7 @@ int main(int argc, char** argv) {
   using namespace jostle::world;
   CLI::App app("Simulates the world in which actions happen.", "jostle sim");
   std::string scene_file, belief_file, level = "none", mocap;
+  bool has_camera = false;
   std::uint64_t seed = 0;
   SimulatedWorldOptions options;
   wire::ParticipantOptions participant_options{
@@ -41,9 +43,14 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
   app.add_flag("--free-running", options.free_running, "Go on between actions instead of standing still");
+  auto* camera_option = app.add_flag(
+      "--camera", has_camera,
+      "Render what a camera above the surface sees of the objects and their tags, as /camera/image_raw and\n"
+      "/camera/camera_info (`jostle perceive camera` looks at it); they are not published otherwise then");
   app.add_option("--mocap", mocap,
                  "IPv4 address at which a simulated motion capture sees the objects (NatNet; `jostle perceive mocap`\n"
-                 "reads it); they are not published then (default: none)");
+                 "reads it); they are not published then (default: none)")
+      ->excludes(camera_option);
   common::add_process_options(app, process);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   common::die_with_parent(process.parent);
@@ -81,7 +88,11 @@ int main(int argc, char** argv) {
 
   try {
     std::unique_ptr<ObjectsOut> objects;
-    if (mocap.empty()) {
+    if (has_camera) {
+      auto tags_result = tags_of(*scene_result);
+      if (!tags_result) return fail(tags_result.error());
+      objects = std::make_unique<CameraOut>(*participant_result, *scene_result, std::move(tags_result).value(), seed);
+    } else if (mocap.empty()) {
       objects = std::make_unique<ObjectTopics>(*participant_result);
     } else {
       auto cameras_result = MocapCameras::start(mocap, physics_pool::layout_of(*scene_result));

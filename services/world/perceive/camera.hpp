@@ -1,0 +1,29 @@
+#pragma once
+/// \file
+/// Objects as a camera sees the tags on them.
+
+#include <filesystem>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "idl/types/pose.hpp"
+#include "idl/types/result.hpp"
+#include "services/wire/dds/participant.hpp"
+
+namespace jostle::world {
+
+struct CameraOptions {
+  std::string name = "camera";  ///< images come on NAME/image_raw, intrinsics on NAME/camera_info
+  std::filesystem::path scene;  ///< whose objects have tags as tags_of() says
+  std::optional<Pose> X_WC;     ///< where the camera is; nothing: overhead()
+};
+
+/// Publishes where the objects are, once for each image in which a tag is seen, until a stop is requested. An object
+/// that stands (tilted by less than 15 degrees, its height off by less than 2 cm) is put upright on the surface, along
+/// the ray through its tag: what a camera knows least is how far away things are. Errors   those of load_scene() and
+/// tags_of()
+Result<void> look_through_camera(const wire::Participant& participant, const CameraOptions& options,
+                                 std::stop_token stop);
+
+}  // namespace jostle::world

@@ -41,7 +41,7 @@ Execution::Execution(const ControlSetup& setup, double step_duration, const OnEv
       deadline_(start_ + setup.limits.timeout) {}
 
 Result<void> Execution::observe() {
-  auto robot_result = setup_.robot.read();
+  auto robot_result = setup_.robot.read(stop_);
   if (!robot_result) return robot_result.error();
   auto objects_result = setup_.objects.read();
   if (!objects_result) return objects_result.error();

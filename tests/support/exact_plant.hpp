@@ -13,6 +13,9 @@ class ExactPlant final : public robot_bridge::ur_sim::Plant {
  public:
   using Joints = robot_bridge::ur_sim::Joints;
 
+  ExactPlant() = default;
+  explicit ExactPlant(const Joints& q) : q_(q) {}
+
   Result<void> step(const Joints& speeds, double opening_rate, double duration) override {
     qd_ = is_stuck ? Joints{} : speeds;
     for (std::size_t j = 0; j < q_.size(); ++j) q_[j] += qd_[j] * duration;

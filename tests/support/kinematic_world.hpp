@@ -4,7 +4,9 @@
 /// told, objects stand still, and tests step in where they like.
 
 #include <functional>
+#include <numeric>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "perception/api/object_source.hpp"
@@ -32,22 +34,33 @@ class KinematicRobot final : public robot_bridge::Robot {
   explicit KinematicRobot(State& x, int joints = 5, int axes = kGripperControls)
       : x_(x), joints_(joints), limits_(static_cast<std::size_t>(axes), 2.0) {}
 
-  Result<robot_bridge::RobotReading> read() override {
+  Result<robot_bridge::RobotReading> read(std::stop_token stop = {}) override {
     if (read_error) return *read_error;
-    return robot_bridge::RobotReading{.q = {x_.q.begin(), x_.q.begin() + joints_},
+    if (stop.stop_requested()) return Error{Code::kCancelled, "robot: cancelled"};
+    return robot_bridge::RobotReading{.stamp = std::accumulate(durations.begin(), durations.end(), 0.0),
+                                      .q = {x_.q.begin(), x_.q.begin() + joints_},
                                       .v = std::vector<double>(static_cast<std::size_t>(joints_), 0.0),
                                       .object_in_hand = object_in_hand};
   }
 
-  Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override {
+  Result<void> start(std::span<const double> u, double duration, std::stop_token stop = {}) override {
+    if (at_work_) return robot_bridge::action_at_work();
     if (execute_error) return *execute_error;
     if (auto ok = robot_bridge::check_command(u, limits_, duration); !ok) return ok;
     if (stop.stop_requested()) return Error{Code::kCancelled, "robot: cancelled"};
-    executed.emplace_back(u.begin(), u.end());
+    at_work_.emplace(std::vector<double>(u.begin(), u.end()), duration);
+    return {};
+  }
+
+  Result<bool> advance(std::stop_token stop = {}) override {
+    if (!at_work_) return true;
+    const auto [u, duration] = *std::exchange(at_work_, {});
+    if (stop.stop_requested()) return Error{Code::kCancelled, "robot: cancelled"};
+    executed.push_back(u);
     durations.push_back(duration);
     x_ = moved(x_, u, duration);
     if (after_execute) after_execute(x_, static_cast<int>(executed.size()));
-    return {};
+    return true;
   }
 
   std::vector<std::vector<double>> executed;
@@ -59,7 +72,8 @@ class KinematicRobot final : public robot_bridge::Robot {
  private:
   State& x_;
   int joints_;
-  std::vector<double> limits_;  // per axis
+  std::vector<double> limits_;                                     // per axis
+  std::optional<std::pair<std::vector<double>, double>> at_work_;  // u, s
 };
 
 class KinematicObjects final : public perception::ObjectSource {

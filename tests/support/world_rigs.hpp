@@ -46,6 +46,14 @@ class WorldRig {
   /// What the world must be like after all that act() did.
   virtual State truth() = 0;
 
+  /// Returns the largest speeds of the robot's axes, m/s or rad/s.
+  virtual std::vector<double> limits() const { return physics_pool::axis_limits(scene.robot.model); }
+
+  /// Whether time goes on between actions, and an action takes as long as the machine lets it.
+  virtual bool time_goes_on() const { return false; }
+  /// Returns how far a robot that should stand still may move meanwhile, m and rad.
+  virtual double play() const { return 0.0; }
+
   /// Until an action that another thread began is at work, as far as one can see that.
   virtual void wait_until_busy() {}
 
@@ -150,7 +158,8 @@ class RecordedRig : public WorldRig {
     const auto joints = static_cast<std::ptrdiff_t>(layout.joints.size());
     for (std::size_t i = 0; i <= kActions; ++i) {
       states_.push_back(x);
-      const world::Seen seen{.robot = {.q = {x.q.begin(), x.q.begin() + joints},
+      const world::Seen seen{.robot = {.stamp = kActionTime * static_cast<double>(i),
+                                       .q = {x.q.begin(), x.q.begin() + joints},
                                        .v = {x.v.begin(), x.v.begin() + joints},
                                        .object_in_hand = scene.robot.model.hand ? std::optional(false) : std::nullopt},
                              .objects = world::object_readings(layout, x)};

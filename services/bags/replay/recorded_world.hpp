@@ -32,7 +32,8 @@ class RecordedWorld {
 
  private:
   Result<world::Seen> seen() const;
-  Result<void> advance(std::span<const double> u, double duration, std::stop_token stop);
+  Result<void> start(std::span<const double> u, double duration, const std::stop_token& stop);
+  Result<bool> advance(std::stop_token stop);
 
   const RecordedRun& run_;
   const std::vector<double> limits_;
@@ -40,13 +41,15 @@ class RecordedWorld {
   const std::chrono::steady_clock::time_point start_;
   std::size_t at_ = 0;  // the present observation
   bool over_ = false;
+  bool acts_ = false;  // an action is at work
 };
 
 class RecordedWorld::Robot final : public robot_bridge::Robot {
  public:
   explicit Robot(RecordedWorld& world) : world_(world) {}
-  Result<robot_bridge::RobotReading> read() override;
-  Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override;
+  Result<robot_bridge::RobotReading> read(std::stop_token stop = {}) override;
+  Result<void> start(std::span<const double> u, double duration, std::stop_token stop = {}) override;
+  Result<bool> advance(std::stop_token stop = {}) override;
 
  private:
   RecordedWorld& world_;

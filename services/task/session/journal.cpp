@@ -41,19 +41,30 @@ void Journal::planned(const planners::Problem& problem, const planners::Plan& pl
   if (listener_.on_plan) listener_.on_plan(message);
 }
 
-Result<robot_bridge::RobotReading> Journal::Robot::read() {
-  auto reading_result = robot_.read();
+Result<robot_bridge::RobotReading> Journal::Robot::read(std::stop_token stop) {
+  auto reading_result = robot_.read(std::move(stop));
   if (reading_result) journal_.reading_ = *reading_result;
   return reading_result;
 }
 
-Result<void> Journal::Robot::execute(std::span<const double> u, double duration, std::stop_token stop) {
-  auto ok = robot_.execute(u, duration, std::move(stop));
+Result<void> Journal::Robot::start(std::span<const double> u, double duration, std::stop_token stop) {
+  auto ok = robot_.start(u, duration, std::move(stop));
   if (ok) {
-    journal_.command_.assign(u.begin(), u.end());
-    journal_.duration_ = duration;
+    command_.assign(u.begin(), u.end());
+    duration_ = duration;
   }
   return ok;
+}
+
+Result<bool> Journal::Robot::advance(std::stop_token stop) {
+  const auto over = robot_.advance(std::move(stop));
+  if (over && !*over) return over;
+  if (over && !command_.empty()) {
+    journal_.command_ = command_;
+    journal_.duration_ = duration_;
+  }
+  command_.clear();
+  return over;
 }
 
 Result<std::vector<perception::ObjectReading>> Journal::Objects::read() {

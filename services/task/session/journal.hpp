@@ -54,12 +54,15 @@ class Journal {
 class Journal::Robot final : public robot_bridge::Robot {
  public:
   Robot(Journal& journal, robot_bridge::Robot& robot) : journal_(journal), robot_(robot) {}
-  Result<robot_bridge::RobotReading> read() override;
-  Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override;
+  Result<robot_bridge::RobotReading> read(std::stop_token stop = {}) override;
+  Result<void> start(std::span<const double> u, double duration, std::stop_token stop = {}) override;
+  Result<bool> advance(std::stop_token stop = {}) override;
 
  private:
   Journal& journal_;
   robot_bridge::Robot& robot_;
+  std::vector<double> command_;  // of the action at work; empty: none is
+  double duration_ = 0.0;        // s
 };
 
 class Journal::Objects final : public perception::ObjectSource {

@@ -3,13 +3,10 @@
 /// A real arm and gripper as a body that obeys over DDS.
 
 #include <chrono>
-#include <cstdint>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "robot_bridge/robotiq/client.hpp"
-#include "robot_bridge/ur/planar_arm.hpp"
+#include "robot_bridge/ur/arm_hand.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/topics.hpp"
 #include "services/wire/dds/writer.hpp"
@@ -17,15 +14,15 @@
 
 namespace jostle::world {
 
-/// An ArmBody is the planner's planar gripper, made of a UR5 and a Robotiq gripper: axes x, y, rotation, opening.
-/// Stamps are of the time of day.
+/// An ArmBody is an arm's hand on DDS, with the arm's joints beside it. Stamps are of the time of day.
 class ArmBody final : public Body {
  public:
-  /// `gripper` may be null: then the hand stays as it is, open. `patience`: with a commander that is silent.
-  ArmBody(const wire::Participant& participant, robot_bridge::ur::PlanarArm& arm,
-          robot_bridge::robotiq::Client* gripper, std::chrono::milliseconds patience);
+  /// `hand` is asked what only it knows; commands and readings pass through `robot`, which is `hand` or stands before
+  /// it. `patience`: with a commander that is silent. Both outlive it.
+  ArmBody(const wire::Participant& participant, robot_bridge::ur::ArmHand& hand, robot_bridge::Robot& robot,
+          std::chrono::milliseconds patience);
 
-  std::vector<double> limits() const override;
+  std::vector<double> limits() const override { return robot_bridge::ur::ArmHand::limits(); }
   Result<void> begin(std::span<const double> u, double duration) override;
   bool is_over() const override { return over_; }
   Result<void> advance() override;
@@ -33,27 +30,16 @@ class ArmBody final : public Body {
   Result<bool> rest() override;
   std::optional<std::chrono::milliseconds> patience() const override { return patience_; }
   std::chrono::milliseconds period() const override { return std::chrono::milliseconds(20); }
-  double time() const override;
-  robot_bridge::RobotReading reading() const override;
+  robot_bridge::RobotReading reading() override;
   void publish() override;
 
-  /// Says what keeps it from moving; "" if nothing does.
-  std::string trouble();
-
  private:
-  void refresh();
-
-  robot_bridge::ur::PlanarArm& arm_;
-  robot_bridge::robotiq::Client* const gripper_;
+  robot_bridge::ur::ArmHand& hand_;
+  robot_bridge::Robot& robot_;
   const std::chrono::milliseconds patience_;
-  robot_bridge::ur::PlanarArm::Report report_;
-  robot_bridge::robotiq::Client::Report hand_;
-  std::uint64_t motion_ = 0;  // the arm's number
   bool over_ = true;
-  std::string said_;           // the trouble that was told last
-  double opening_ = 0.0;       // m, where it should be
-  double opening_rate_ = 0.0;  // m/s
-  std::chrono::steady_clock::time_point moved_at_{}, deadline_{};
+  std::string said_;                    // the trouble that was told last
+  robot_bridge::RobotReading reading_;  // the last good one
   wire::Writer<sensor_msgs::msg::JointState> joints_;
 };
 

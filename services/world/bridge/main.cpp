@@ -67,11 +67,11 @@ int main(int argc, char** argv) {
     gripper_options.host = arm_options.host;
     std::optional<robot_bridge::robotiq::Client> client;
     if (gripper == "robotiq") client.emplace(gripper_options);
-    ArmBody body(*participant_result, arm, client ? &*client : nullptr,
-                 std::chrono::milliseconds(std::lround(1e3 * silence)));
+    robot_bridge::ur::ArmHand hand(arm, client ? &*client : nullptr);
+    ArmBody body(*participant_result, hand, hand, std::chrono::milliseconds(std::lround(1e3 * silence)));
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience);
     std::string said;
-    for (std::string trouble; !(trouble = body.trouble()).empty();) {
+    for (std::string trouble; !(trouble = hand.trouble()).empty();) {
       if (trouble != said) spdlog::info("waiting: {}", said = trouble);
       if (std::chrono::steady_clock::now() > deadline)
         return fail(

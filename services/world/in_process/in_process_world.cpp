@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "physics_pool/objective/scorer.hpp"
 #include "robot_bridge/safety/command_check.hpp"
@@ -27,24 +28,35 @@ robot_bridge::RobotReading robot_reading(const physics_pool::ExecutionWorld& wor
   const State& x = world.state();
   const physics_pool::TaskGeometry& geometry = world.world().geometry();
   const int joints = geometry.layout.robot_joints();
-  return {.q = {x.q.begin(), x.q.begin() + joints},
+  return {.stamp = world.time(),
+          .q = {x.q.begin(), x.q.begin() + joints},
           .v = {x.v.begin(), x.v.begin() + joints},
           .object_in_hand = physics_pool::object_in_hand(geometry, x)};
 }
 
-Result<robot_bridge::RobotReading> SimulatedRobot::read() { return robot_reading(world_); }
+Result<robot_bridge::RobotReading> SimulatedRobot::read(std::stop_token stop) {
+  if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped on request"};
+  return robot_reading(world_);
+}
 
-Result<void> SimulatedRobot::execute(std::span<const double> u, double duration, std::stop_token stop) {
+Result<void> SimulatedRobot::start(std::span<const double> u, double duration, std::stop_token stop) {
+  if (steps_left_ > 0) return robot_bridge::action_at_work();
   if (auto ok = robot_bridge::check_command(u, physics_pool::axis_limits(world_.world().scene().robot.model), duration);
       !ok)
     return ok;
+  if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped before it moved"};
   world_.begin(u);
-  const long steps = std::lround(duration / world_.world().time_step());
-  for (long i = 0; i < steps; ++i) {
-    if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped in mid-action"};
-    if (auto ok = world_.step(); !ok) return ok;
-  }
+  steps_left_ = std::lround(duration / world_.world().time_step());
   return {};
+}
+
+Result<bool> SimulatedRobot::advance(std::stop_token stop) {
+  if (steps_left_ <= 0) return true;
+  const long left = std::exchange(steps_left_, 0);
+  if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped in mid-action"};
+  if (auto ok = world_.step(); !ok) return ok.error();
+  steps_left_ = left - 1;
+  return steps_left_ == 0;
 }
 
 Result<std::vector<perception::ObjectReading>> SimulatedObjects::read() {

@@ -23,11 +23,13 @@ class SimulatedRobot final : public robot_bridge::Robot {
  public:
   explicit SimulatedRobot(physics_pool::ExecutionWorld& world) : world_(world) {}
 
-  Result<robot_bridge::RobotReading> read() override;
-  Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override;
+  Result<robot_bridge::RobotReading> read(std::stop_token stop = {}) override;
+  Result<void> start(std::span<const double> u, double duration, std::stop_token stop = {}) override;
+  Result<bool> advance(std::stop_token stop = {}) override;
 
  private:
   physics_pool::ExecutionWorld& world_;
+  long steps_left_ = 0;  // engine steps of the action at work
 };
 
 /// Sees the objects of an execution world as observed_state does: the initial

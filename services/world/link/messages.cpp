@@ -183,8 +183,10 @@ std::optional<bool> in_hand_from(std::uint8_t in_hand) {
 
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message) {
   if (auto ok = check_finite(message.q(), message.v()); !ok) return ok.error();
-  return robot_bridge::RobotReading{
-      .q = message.q(), .v = message.v(), .object_in_hand = in_hand_from(message.in_hand())};
+  return robot_bridge::RobotReading{.stamp = seconds(message.header()),
+                                    .q = message.q(),
+                                    .v = message.v(),
+                                    .object_in_hand = in_hand_from(message.in_hand())};
 }
 
 jostle_msgs::msg::Observation to_message(const Seen& seen, double time) {
@@ -201,7 +203,10 @@ Result<Seen> from_message(const jostle_msgs::msg::Observation& message) {
   if (auto ok = check_finite(message.q(), message.v()); !ok) return ok.error();
   auto objects_result = from_messages(message.objects());
   if (!objects_result) return objects_result.error();
-  return Seen{.robot = {.q = message.q(), .v = message.v(), .object_in_hand = in_hand_from(message.in_hand())},
+  return Seen{.robot = {.stamp = seconds(message.header()),
+                        .q = message.q(),
+                        .v = message.v(),
+                        .object_in_hand = in_hand_from(message.in_hand())},
               .objects = std::move(objects_result).value()};
 }
 

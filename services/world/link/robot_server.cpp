@@ -211,7 +211,7 @@ void RobotServer::publish() {
   body_.publish();
   const robot_bridge::RobotReading reading = body_.reading();
   jostle_msgs::msg::RobotStatus status;
-  status.header(make_header(body_.time()));
+  status.header(make_header(reading.stamp));
   status.epoch(epoch_);
   status.sequence_number(finished_);
   status.busy(busy_ || !actions_.empty());

@@ -50,9 +50,8 @@ class Body {
   /// Returns the time between two statuses, by the wall clock.
   virtual std::chrono::milliseconds period() const { return std::chrono::milliseconds(50); }
 
-  /// Returns s of the clock that stamps are of.
-  virtual double time() const = 0;
-  virtual robot_bridge::RobotReading reading() const = 0;
+  /// Returns the newest; the last good one where there is none.
+  virtual robot_bridge::RobotReading reading() = 0;
   /// Publishes what it knows beyond that.
   virtual void publish() = 0;
 };

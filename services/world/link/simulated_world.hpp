@@ -38,8 +38,7 @@ class SimulatedWorld final : public Body {
   Result<void> advance() override;
   void halt() override { steps_left_ = 0; }
   Result<bool> rest() override;
-  double time() const override { return world_.time(); }
-  robot_bridge::RobotReading reading() const override { return robot_reading(world_); }
+  robot_bridge::RobotReading reading() override { return robot_reading(world_); }
   void publish() override;
 
  private:

@@ -74,11 +74,13 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::chrono::mill
   }
 }
 
-Result<robot_bridge::RobotReading> RobotClient::read() {
+Result<robot_bridge::RobotReading> RobotClient::read(std::stop_token stop) {
   status_.take_all();  // yesterday's news
   for (;;) {
-    auto status_result = next_status(patience(), {});
+    auto status_result = next_status(patience(), stop);
     if (!status_result) return status_result.error();
+    repeat_if_at_work(*status_result);
+    if (at_work_) return from_message(*status_result);
     const bool current = sequence_number_ == 0 ||
                          (status_result->epoch() == epoch_ && status_result->sequence_number() == sequence_number_);
     if (!current || status_result->busy()) continue;
@@ -100,28 +102,28 @@ Result<void> RobotClient::wait_for_robot(std::stop_token stop) {
   return {};
 }
 
-Result<void> RobotClient::wait_until_finished(const jostle_msgs::msg::VelocityCommand& command, std::stop_token stop) {
-  auto idle_since = steady_clock::now();
-  for (;;) {
-    auto status_result = next_status(patience(), stop);
-    if (!status_result) return status_result.error();
-    const auto now = steady_clock::now();
-    if (status_result->busy()) {
-      idle_since = now;
-      // A robot that can do harm wants to hear that somebody is still there. When it is not sent, it will miss it.
-      if (status_result->epoch() == epoch_) (void)command_.write(command);
-    }
-    if (now - idle_since > options_.start) return not_taken(*status_result);
-    if (status_result->epoch() != epoch_) continue;
-    const bool finished = status_result->sequence_number() >= sequence_number_;
+// A robot that can do harm wants to hear that somebody is still there. When it is not sent, it will miss it.
+void RobotClient::repeat_if_at_work(const jostle_msgs::msg::RobotStatus& status) {
+  if (!at_work_ || !status.busy()) return;
+  idle_since_ = steady_clock::now();
+  if (status.epoch() == epoch_) (void)command_.write(*at_work_);
+}
+
+Result<bool> RobotClient::hear_of(const jostle_msgs::msg::VelocityCommand& command, std::stop_token stop) {
+  auto status_result = next_status(patience(), std::move(stop));
+  if (!status_result) return status_result.error();
+  repeat_if_at_work(*status_result);
+  if (status_result->epoch() == epoch_) {
+    const bool finished = status_result->sequence_number() >= command.sequence_number();
     const std::string error = common::shown(status_result->error(), wire::limits::kShownError);
-    if (error.empty() || (!finished && error == refusal_)) {  // or an earlier command's
-      if (finished) return {};
-      continue;
+    if (!error.empty() && (finished || error != refusal_)) {  // else it is an earlier command's
+      refusal_ = error;
+      return Error{Code::kInvalidArgument, "robot: " + error};
     }
-    refusal_ = error;
-    return Error{Code::kInvalidArgument, "robot: " + error};
+    if (finished) return true;
   }
+  if (steady_clock::now() - idle_since_ > options_.start) return not_taken(*status_result);
+  return false;
 }
 
 // The robot stands still, and does not say that it has our command.
@@ -152,7 +154,8 @@ Result<void> RobotClient::halt() {
                                                static_cast<double>(options_.silence.count()) / 1e3)};
 }
 
-Result<void> RobotClient::execute(std::span<const double> u, double duration, std::stop_token stop) {
+Result<void> RobotClient::start(std::span<const double> u, double duration, std::stop_token stop) {
+  if (at_work_) return robot_bridge::action_at_work();
   if (auto ok = wait_for_robot(stop); !ok) return ok;
   // Here already: a robot says nothing of a newcomer's bad command.
   if (auto ok = robot_bridge::check_command(u, limits_, duration); !ok) return ok;
@@ -166,10 +169,19 @@ Result<void> RobotClient::execute(std::span<const double> u, double duration, st
   if (!command_.write(command)) {
     return Error{Code::kUnavailable, "robot: the middleware took no command on " + wire::topics::kRobotCommand.name};
   }
-  auto ok = wait_until_finished(command, stop);
-  if (ok || ok.error().code != Code::kCancelled) return ok;
-  if (auto halted = halt(); !halted) return halted;
-  return ok;
+  at_work_ = std::move(command);
+  idle_since_ = steady_clock::now();
+  return {};
+}
+
+Result<bool> RobotClient::advance(std::stop_token stop) {
+  if (!at_work_) return true;
+  auto over = hear_of(*at_work_, std::move(stop));
+  if (over && !*over) return over;
+  at_work_.reset();
+  if (over || over.error().code != Code::kCancelled) return over;
+  if (auto halted = halt(); !halted) return halted.error();
+  return over;
 }
 
 ObjectsClient::ObjectsClient(const wire::Participant& participant, const RobotClient& robot,

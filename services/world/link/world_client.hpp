@@ -40,8 +40,9 @@ class RobotClient final : public robot_bridge::Robot {
  public:
   RobotClient(const wire::Participant& participant, const WorldClientOptions& options = {});
 
-  Result<robot_bridge::RobotReading> read() override;
-  Result<void> execute(std::span<const double> u, double duration, std::stop_token stop) override;
+  Result<robot_bridge::RobotReading> read(std::stop_token stop = {}) override;
+  Result<void> start(std::span<const double> u, double duration, std::stop_token stop = {}) override;
+  Result<bool> advance(std::stop_token stop = {}) override;
 
   /// Returns the time stamp of the newest status, s of the world's clock.
   double time() const { return time_; }
@@ -60,8 +61,9 @@ class RobotClient final : public robot_bridge::Robot {
   /// Waits until the sender of the statuses reads our commands. It does not count that others read them.
   Result<void> wait_for_robot(std::stop_token stop);
 
-  /// Waits until the command of sequence_number_ is finished or refused.
-  Result<void> wait_until_finished(const jostle_msgs::msg::VelocityCommand& command, std::stop_token stop);
+  /// Waits for one status more, and returns whether the command at work is finished.
+  Result<bool> hear_of(const jostle_msgs::msg::VelocityCommand& command, std::stop_token stop);
+  void repeat_if_at_work(const jostle_msgs::msg::RobotStatus& status);
   Error not_taken(const jostle_msgs::msg::RobotStatus& status) const;
 
   /// Makes the robot stand still. Error kUnavailable: it does not say that it does.
@@ -72,6 +74,8 @@ class RobotClient final : public robot_bridge::Robot {
   wire::Writer<jostle_msgs::msg::VelocityCommand> command_;
   const std::uint64_t epoch_;
   std::uint64_t sequence_number_ = 0;
+  std::optional<jostle_msgs::msg::VelocityCommand> at_work_;
+  std::chrono::steady_clock::time_point idle_since_{};  // the robot, while a command of ours should be at work
   std::string refusal_;                 // the last one heard; it is repeated until the next good command
   std::optional<std::uint64_t> robot_;  // its participant
   bool heard_ = false;

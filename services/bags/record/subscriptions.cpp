@@ -234,7 +234,7 @@ Result<std::unique_ptr<Subscriptions>> Subscriptions::open(Options options) {
       [impl = impl.get()](const wire::Endpoint& endpoint) { impl->note(endpoint); },
       [impl = impl.get()](const wire::Endpoint& endpoint) { impl->forget(endpoint); });
   auto participant_result = wire::Participant::open(
-      {.name = "jostle_record", .domain = impl->options.domain, .watch = watch, .role = wire::Role::kObserver});
+      {.name = impl->options.name, .domain = impl->options.domain, .watch = watch, .role = wire::Role::kObserver});
   if (!participant_result) return participant_result.error();
   impl->participant = *participant_result;
   try {

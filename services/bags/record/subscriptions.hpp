@@ -30,6 +30,7 @@ namespace jostle::bags {
 class Subscriptions {
  public:
   struct Options {
+    std::string name = "jostle_record";  ///< of the participant, as tools list it
     std::optional<int> domain;
     Selection selection;
     /// Returns the text of a type such as "jostle_msgs/msg/Goal", or nothing if it is unknown.

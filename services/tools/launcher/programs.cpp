@@ -32,6 +32,7 @@ constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string
     {"sim", "simulate the world in which actions happen"},
     {"train-coarse", "train the learned coarse model of pushing"},
     {"ur-sim", "simulate a UR5 and its gripper behind their own protocols"},
+    {"view", "show a run or a bag in a browser and in Foxglove"},
     {"worker", "simulate rollouts for whoever asks"},
     {"workers", "list the workers of a domain, and whom they serve"},
 });

@@ -25,6 +25,7 @@ using boost::asio::ip::tcp;
 inline tcp::socket connect_to(boost::asio::io_context& context, std::uint16_t port) {
   tcp::socket socket(context);
   socket.connect({boost::asio::ip::address_v4::loopback(), port});
+  socket.set_option(tcp::no_delay(true));
   return socket;
 }
 

@@ -219,6 +219,11 @@ class ViewOfABag : public ::testing::Test {
     return {{"op", "setParameters"}, {"parameters", {{{"name", name}, {"value", value}}}}, {"id", name}};
   }
 
+  static nlohmann::json parameter(ViewClient& viewer, const std::string& name) {
+    viewer.send({{"op", "getParameters"}, {"parameterNames", {name}}});
+    return viewer.next_op("parameterValues")["parameters"][0]["value"];
+  }
+
   const TempFolder folder;
   std::unique_ptr<BagSource> bag;
   std::unique_ptr<ViewServer> server;
@@ -231,16 +236,23 @@ TEST_F(ViewOfABag, GoesWhereAViewerWants) {
   viewer.subscribe(0, viewer.channel("/chatter")["id"].get<std::uint32_t>());
 
   viewer.send(set("playback.time", 0.505));
-  EXPECT_EQ(viewer.next([](const auto& frame) { return frame.is_sample(); }).sample(), cdr_of("50"));
-  EXPECT_EQ(viewer.next([](const auto& frame) { return frame.is_time() && frame.time() > kBegin; }).time(),
-            kBegin + 505'000'000);
+  bool shown = false, told = false;  // in either order
+  while (!shown || !told) {
+    const auto frame = viewer.next();
+    if (frame.is_sample()) {
+      EXPECT_EQ(frame.sample(), cdr_of("50"));
+      shown = true;
+    }
+    told |= frame.is_time() && frame.time() == kBegin + 505'000'000;
+  }
   viewer.send(set("playback.time", 0.205));  // and back
   EXPECT_EQ(viewer.next_sample().sample(), cdr_of("20"));
 
   viewer.send(set("playback.rate", 100.0));
   viewer.send(set("playback.paused", false));
   for (int i = 21; i < kMessages; ++i) EXPECT_EQ(viewer.next_sample().sample(), cdr_of(std::to_string(i)));
-  viewer.next([](const auto& frame) { return frame.is_time() && frame.time() == kBegin + 990'000'000; });
+  while (parameter(viewer, "playback.paused") == false) {
+  }
   viewer.send(set("playback.paused", false));  // at the end: from the beginning
   EXPECT_EQ(viewer.next_sample().sample(), cdr_of("0"));
 }

@@ -98,7 +98,10 @@ std::string_view host_name(std::string_view host) {
 }
 
 bool is_loopback_name(std::string_view name) {
-  return name == "localhost" || name == "[::1]" || name.starts_with("127.");
+  if (name.starts_with('[') && name.ends_with(']')) name = name.substr(1, name.size() - 2);
+  error_code error;
+  const auto address = asio::ip::make_address(std::string(name), error);
+  return error ? name == "localhost" : address.is_loopback();
 }
 
 // In a time that says nothing of where they differ.
@@ -510,6 +513,8 @@ Result<void> ViewServer::Impl::listen() {
 void ViewServer::Impl::accept() {
   acceptor.async_accept([this](error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
+    error_code ignored;
+    if (!error) socket.set_option(tcp::no_delay(true), ignored);  // a sample does not wait for the one before
     if (!error && undecided < kMostUndecided) std::make_shared<Connection>(*this, std::move(socket))->start();
     accept();
   });

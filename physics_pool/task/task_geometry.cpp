@@ -57,6 +57,7 @@ TaskGeometry::TaskGeometry(const Scene& scene)
   for (const SceneObject& object : scene.objects) {
     rest_heights.push_back(object.rest_height());
     footprints.push_back(object.shape == Shape::kBox ? std::hypot(object.size[0], object.size[1]) / 2 : object.radius);
+    round.push_back(object.shape == Shape::kCylinder);
   }
 }
 

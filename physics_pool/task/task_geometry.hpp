@@ -19,6 +19,7 @@ struct TaskGeometry {
   Surface surface;
   std::vector<double> rest_heights;  ///< [objects] m
   std::vector<double> footprints;    ///< [objects] m, radius of the smallest disc around each, seen from above
+  std::vector<bool> round;           ///< [objects] whether a turn about its own axis leaves it as it was
   SceneTask task;
   const TaskKind* kind;  ///< what task.kind means
   SceneObject target;    ///< the target's shape, without its name; the state says where it is

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics_pool/objective/catalogue.hpp"
 #include "physics_pool/sampling/counter_rng.hpp"
 
 namespace jostle::physics_pool {
@@ -161,6 +162,10 @@ Result<void> validate(const RolloutBatch& batch, const StateLayout& layout, doub
   if (auto ok = check_size("x0.v", batch.x0.v.size(), layout.nv); !ok) return ok;
   if (batch.nominal.nu != layout.nu) {
     return invalid("nominal.nu", std::to_string(batch.nominal.nu), std::to_string(layout.nu));
+  }
+  for (const Term& term : batch.objective.terms) {
+    if (!find_term_kind(term.kind)->takes_state || term.values.empty()) continue;
+    if (auto ok = check_size(("objective." + term.kind).c_str(), term.values.size(), layout.nq); !ok) return ok;
   }
   time_step = std::max(time_step, batch.fidelity.time_step);
   for (const auto& [field, duration] : {std::pair("step_duration", batch.step_duration), {"rest", batch.rest}}) {

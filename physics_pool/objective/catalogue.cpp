@@ -10,6 +10,7 @@
 
 #include "physics_pool/objective/objective.hpp"
 #include "physics_pool/objective/terms.hpp"
+#include "physics_pool/task/state_distance.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -167,11 +168,32 @@ const TermKind kMiss{
         "squared; 0 for tasks without a region",
     .final = [](const TaskGeometry& g, const State& x, Values) { return miss_cost(g, x); }};
 
+const TermKind kPads{
+    .name = "pads",
+    .unit = "1/m^2",
+    .weight = 0.0,
+    .meaning =
+        "v_f of Eq. 4.29 with c_g of Eq. 4.39: the target's distance from between the pads, squared; a robot "
+        "without a hand has none",
+    .parameters = {{.name = "angle",
+                    .unit = "m^2/rad^2",
+                    .initial = 0.019,
+                    .meaning = "w_phi of Eq. 4.39, of the target's bearing from the palm, squared"}},
+    .final = [](const TaskGeometry& g, const State& x, Values v) { return pads_cost(g, x, v[0]); }};
+
+const TermKind kState{
+    .name = "state",
+    .unit = "1/m",
+    .weight = 0.0,
+    .meaning = "v_f of Eq. 4.29 where Eq. 4.41 has a wanted state x^d: the distance from it; who plans gives x^d",
+    .final = [](const TaskGeometry& g, const State& x, Values v) { return state_distance(g, x.q, v); },
+    .takes_state = true};
+
 // Sums are made in this order: it is part of the last bit of every cost.
 std::vector<const TermKind*>& catalogue() {
-  static std::vector<const TermKind*> kinds{&kAcceleration, &kDisturbance, &kEdge,      &kTopple,  &kDrop,
-                                            &kObstacle,     &kCollision,   &kIntrusion, &kContact, &kGoal,
-                                            &kObstruction,  &kAction,      &kRim,       &kMiss};
+  static std::vector<const TermKind*> kinds{
+      &kAcceleration, &kDisturbance, &kEdge,        &kTopple, &kDrop, &kObstacle, &kCollision, &kIntrusion,
+      &kContact,      &kGoal,        &kObstruction, &kAction, &kRim,  &kMiss,     &kPads,      &kState};
   return kinds;
 }
 
@@ -248,12 +270,15 @@ Result<void> validate(const Objective& objective) {
       return invalid("objective.terms", "'" + term.kind + "'", fmt::format("one of: {}", fmt::join(known, ", ")));
     }
     if (!seen.insert(term.kind).second) return invalid("objective." + term.kind, "it twice", "it once");
-    if (term.values.size() != kind->parameters.size()) {
+    if (!kind->takes_state && term.values.size() != kind->parameters.size()) {
       return invalid("objective." + term.kind, fmt::format("{} parameters", term.values.size()),
                      std::to_string(kind->parameters.size()));
     }
     if (auto ok = check(term.kind, term.weight, kind->unit, 0.0, std::numeric_limits<double>::max()); !ok) return ok;
-    for (std::size_t i = 0; i < term.values.size(); ++i) {
+    if (kind->takes_state && !std::ranges::all_of(term.values, [](double v) { return std::isfinite(v); })) {
+      return invalid("objective." + term.kind, "a position that is infinite or NaN", "finite ones");
+    }
+    for (std::size_t i = 0; i < kind->parameters.size(); ++i) {
       const TermParameter& p = kind->parameters[i];
       if (auto ok = check(term.kind + "_" + p.name, term.values[i], p.unit, p.least, p.most); !ok) return ok;
     }

@@ -30,6 +30,9 @@ struct TermKind {
   std::vector<TermParameter> parameters;
   double (*running)(const Step& step, std::span<const double> values) = nullptr;  ///< per control step; may be null
   double (*final)(const TaskGeometry& geometry, const State& x, std::span<const double> values) = nullptr;
+  /// Its values are the positions of a state, [nq], and no parameters. Without any there is no such state, and the term
+  /// costs nothing.
+  bool takes_state = false;
 };
 
 /// Returns all kinds, in the order in which costs are summed.

@@ -15,7 +15,7 @@ namespace jostle::physics_pool {
 struct Term {
   std::string kind;
   double weight = 0.0;         ///< >= 0, so a running sum of costs never falls: that makes stopping losers early exact
-  std::vector<double> values;  ///< parameters in the order of the kind's row
+  std::vector<double> values;  ///< parameters in the order of the kind's row, or a state's positions if it takes one
 
   bool operator==(const Term&) const = default;
 };

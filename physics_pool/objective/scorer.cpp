@@ -8,7 +8,7 @@ Scorer::Scorer(const Objective& objective)
     : drop_height_(objective.value("drop", "height")), topple_angle_(objective.value("topple", "angle")) {
   for (const TermKind* kind : term_catalogue()) {
     const Term* term = objective.find(kind->name);
-    if (!term || term->weight == 0) continue;
+    if (!term || term->weight == 0 || (kind->takes_state && term->values.empty())) continue;
     const Row row{kind, term->weight, &term->values};
     if (kind->running) running_.push_back(row);
     if (kind->final) final_.push_back(row);

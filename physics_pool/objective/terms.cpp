@@ -66,6 +66,14 @@ double miss_cost(const TaskGeometry& geometry, const State& x) {
   return outside > 0 ? outside * outside : 0.0;
 }
 
+double pads_cost(const TaskGeometry& geometry, const State& x, double angle_weight) {
+  if (!geometry.robot.hand) return 0.0;
+  const InTool p = in_tool(geometry, x, geometry.view(x).target().position());
+  const double ahead = p.forward - geometry.robot.hand->depth;
+  const double angle = target_bearing(geometry, x).angle;
+  return ahead * ahead + p.left * p.left + angle_weight * (angle * angle);
+}
+
 double obstacle_cost(const TaskGeometry& geometry, const State& x, const ObstacleCost& obstacle) {
   if (!geometry.task.obstacle) return 0.0;
   const auto nearness = [&](const double* p) {

@@ -42,6 +42,11 @@ double rim_cost(const TaskGeometry& geometry, const State& x0, const State& x1, 
 /// region of radius R_g; 0 inside it and for tasks that have none.
 double miss_cost(const TaskGeometry& geometry, const State& x);
 
+/// Returns c_g of Eq. 4.39, d^2 + w_phi·phi^2: d from the point between the hand's pads, where approaches aim to have
+/// the target, phi its bearing as the palm sees it. At the pads the thesis's own phi, from the same point as d, is
+/// undefined.
+double pads_cost(const TaskGeometry& geometry, const State& x, double angle_weight);
+
 struct ObstacleCost {
   double target = 5.0;    ///< w_s, m^2
   double pusher = 1.0;    ///< w_p, m^2

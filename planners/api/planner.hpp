@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
 #include "idl/types/result.hpp"
 #include "idl/types/state.hpp"
 #include "physics_pool/api/pool.hpp"
+#include "planners/api/robustness.hpp"
 
 namespace jostle::planners {
 
@@ -27,6 +29,9 @@ struct Problem {
   std::uint64_t seed = 0;
   std::uint32_t stream = 0;  ///< first noise stream; one is used per iteration
   physics_pool::Objective objective = physics_pool::Objective::standard();
+  /// Planners that weigh robustness leave it out of this plan where it is false: then they plan with J of Eq. 4.29
+  /// alone.
+  bool weigh_robustness = true;
   physics_pool::Priority priority = physics_pool::Priority::kNormal;  ///< of its rollouts; changes no plan
   /// Where the planner counts rollouts when it asks for them, so that those of a plan that fails are known as well;
   /// null: nowhere. Whoever sets it keeps it until the planner returns.
@@ -53,9 +58,10 @@ struct Plan {
   bool at_goal = false;
   int iterations = 0;
   std::uint64_t rollouts = 0;
-  int denials = 0;              ///< successes of reduced physics that full physics denied
-  std::vector<Choice> choices;  ///< of planners that choose among several first actions
-  int chosen = -1;              ///< index into choices
+  int denials = 0;                       ///< successes of reduced physics that full physics denied
+  std::vector<Choice> choices;           ///< of planners that choose among several first actions
+  int chosen = -1;                       ///< index into choices
+  std::optional<Robustness> robustness;  ///< of planners that weigh it
 };
 
 /// Progress of a running plan, once per iteration.

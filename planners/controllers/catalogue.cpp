@@ -47,10 +47,35 @@ Result<Outcome> adapt(const ControlSetup& setup, const ControllerOptions& option
 }
 
 template <AdaptiveOptions (*method)(AdaptiveOptions)>
-std::unique_ptr<Planner> adaptive_planner(physics_pool::Pool& pool, const physics_pool::TaskGeometry& geometry,
-                                          const PbstoOptions& optimizer, const ControllerOptions& options,
-                                          OnProgress on_progress) {
+std::unique_ptr<Planner> adaptive_planner(physics_pool::Pool& pool, const Scene&,
+                                          const physics_pool::TaskGeometry& geometry, const PbstoOptions& optimizer,
+                                          const ControllerOptions& options, OnProgress on_progress) {
   return std::make_unique<AdaptivePlanner>(pool, geometry, optimizer, method(options.adaptive), std::move(on_progress));
+}
+
+// `method` makes one of the five methods of Sec. 4.5 of the same options.
+template <RobustControlOptions (*method)(RobustControlOptions)>
+Result<Outcome> robust(const ControlSetup& setup, const ControllerOptions& options, const OnEvent& on_event,
+                       std::stop_token stop) {
+  return run_robust(setup, method(options.robust), on_event, std::move(stop));
+}
+
+template <RobustControlOptions (*method)(RobustControlOptions)>
+std::unique_ptr<Planner> robust_planner(physics_pool::Pool& pool, const Scene& scene,
+                                        const physics_pool::TaskGeometry& geometry, const PbstoOptions& optimizer,
+                                        const ControllerOptions& options, OnProgress on_progress) {
+  return std::make_unique<RobustSto>(pool, scene, geometry, optimizer, method(options.robust).planner,
+                                     std::move(on_progress));
+}
+
+template <RobustControlOptions (*method)(RobustControlOptions)>
+constexpr ControllerKind robust_kind(const char* name, const char* purpose) {
+  return {.name = name,
+          .purpose = purpose,
+          .parameters = "experiments/robust.yaml",
+          .fits = grasps_in_the_plane,
+          .run = robust<method>,
+          .planner = robust_planner<method>};
 }
 
 constexpr ControllerKind kOnline{.name = "or",
@@ -87,8 +112,19 @@ constexpr ControllerKind kSlowMpc{.name = "slow-mpc",
                                   .run = adapt<standard_mpc>,
                                   .planner = adaptive_planner<standard_mpc>};
 
+constexpr ControllerKind kOpenLoop = robust_kind<open_loop>("ol", "a whole plan without looking (OL of Sec. 4.5)");
+constexpr ControllerKind kRobustOpenLoop =
+    robust_kind<robust_open_loop>("rol", "the same with a plan that is robust in several worlds (ROL)");
+constexpr ControllerKind kConvergent =
+    robust_kind<convergent>("cp", "the same with a plan that is robust in the planning world (CP)");
+constexpr ControllerKind kClosedLoop = robust_kind<closed_loop>("cc", "a new plan after every action (CC)");
+constexpr ControllerKind kInterleaved =
+    robust_kind<interleaved>("ocl", "robust parts open-loop, others closed-loop (Alg. 4)");
+
 std::vector<const ControllerKind*>& catalogue() {
-  static std::vector<const ControllerKind*> kinds{&kOnline, &kNaive, &kMpc, &kTampc, &kUampc, &kSlowMpc};
+  static std::vector<const ControllerKind*> kinds{&kOnline,         &kNaive,      &kMpc,        &kOpenLoop,
+                                                  &kRobustOpenLoop, &kConvergent, &kClosedLoop, &kInterleaved,
+                                                  &kTampc,          &kUampc,      &kSlowMpc};
   return kinds;
 }
 
@@ -110,10 +146,10 @@ std::string controller_help() {
   return text;
 }
 
-std::unique_ptr<Planner> make_planner(const ControllerKind& kind, physics_pool::Pool& pool,
+std::unique_ptr<Planner> make_planner(const ControllerKind& kind, physics_pool::Pool& pool, const Scene& scene,
                                       const physics_pool::TaskGeometry& geometry, const PbstoOptions& optimizer,
                                       const ControllerOptions& options, OnProgress on_progress) {
-  if (kind.planner) return kind.planner(pool, geometry, optimizer, options, std::move(on_progress));
+  if (kind.planner) return kind.planner(pool, scene, geometry, optimizer, options, std::move(on_progress));
   return std::make_unique<Pbsto>(pool, optimizer, std::move(on_progress));
 }
 

@@ -11,6 +11,7 @@
 #include "planners/adaptive/adaptive.hpp"
 #include "planners/control/controller.hpp"
 #include "planners/mpc/mpc.hpp"
+#include "planners/robustness/robust_control.hpp"
 
 namespace jostle::planners {
 
@@ -19,8 +20,11 @@ struct ControllerOptions {
   ControlOptions control;
   MpcOptions mpc;
   AdaptiveOptions adaptive;
+  RobustControlOptions robust;
 
-  void set_plan_only(bool plan_only) { control.plan_only = mpc.plan_only = adaptive.plan_only = plan_only; }
+  void set_plan_only(bool plan_only) {
+    control.plan_only = mpc.plan_only = adaptive.plan_only = robust.plan_only = plan_only;
+  }
 };
 
 /// One controller.
@@ -36,16 +40,18 @@ struct ControllerKind {
   Result<Outcome> (*run)(const ControlSetup& setup, const ControllerOptions& options, const OnEvent& on_event,
                          std::stop_token stop);
 
-  /// Makes the planner that it runs with, which keeps references to pool and geometry; null: a Pbsto.
-  std::unique_ptr<Planner> (*planner)(physics_pool::Pool& pool, const physics_pool::TaskGeometry& geometry,
-                                      const PbstoOptions& optimizer, const ControllerOptions& options,
-                                      OnProgress on_progress) = nullptr;
+  /// Makes the planner that it runs with, which keeps references to pool, scene and geometry; null: a Pbsto.
+  std::unique_ptr<Planner> (*planner)(physics_pool::Pool& pool, const physics_pool::Scene& scene,
+                                      const physics_pool::TaskGeometry& geometry, const PbstoOptions& optimizer,
+                                      const ControllerOptions& options, OnProgress on_progress) = nullptr;
 };
 
-/// Makes the planner of a controller. Pool and geometry outlive it.
+/// Makes the planner of a controller. Pool, scene and geometry outlive it.
+/// `scene`: the planning world.
 std::unique_ptr<Planner> make_planner(const ControllerKind& kind, physics_pool::Pool& pool,
-                                      const physics_pool::TaskGeometry& geometry, const PbstoOptions& optimizer,
-                                      const ControllerOptions& options, OnProgress on_progress = {});
+                                      const physics_pool::Scene& scene, const physics_pool::TaskGeometry& geometry,
+                                      const PbstoOptions& optimizer, const ControllerOptions& options,
+                                      OnProgress on_progress = {});
 
 /// Returns all controllers. Where nobody names one, a scene gets the first that fits it.
 std::span<const ControllerKind* const> controllers();

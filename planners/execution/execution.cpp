@@ -58,7 +58,7 @@ Result<void> Execution::observe() {
 }
 
 Result<void> Execution::plan(const ControlSequence& initial, int iterations, const physics_pool::Objective& objective,
-                             std::vector<double> u_before) {
+                             std::vector<double> u_before, bool weigh_robustness) {
   notify(Phase::kPlanning);
   const auto before = Clock::now();
   if (rollouts_left() == 0) {
@@ -76,6 +76,7 @@ Result<void> Execution::plan(const ControlSequence& initial, int iterations, con
                   .seed = setup_.seed,
                   .stream = stream_,
                   .objective = objective,
+                  .weigh_robustness = weigh_robustness,
                   // From the first action on a robot stands still for as long as this takes.
                   .priority = outcome_.actions > 0 ? physics_pool::Priority::kUrgent : physics_pool::Priority::kNormal};
   std::uint64_t asked_for = 0;

@@ -69,8 +69,12 @@ struct Outcome {
   /// Over all plans. One that ran out of time counts with every rollout that it asked for, though some of the last
   /// ones may not have been finished.
   std::uint64_t rollouts = 0;
-  int iterations = 0;                             ///< over all plans that were finished
-  std::chrono::duration<double> plan_time{};      ///< time that the first plan took; 0 if it never came to be
+  int iterations = 0;                         ///< over all plans that were finished
+  std::vector<Segment> segments;              ///< that a robust plan was divided into, in time order
+  int segment = -1;                           ///< index of the one under way, or -1
+  int open_loop_actions = 0;                  ///< of `actions`, those that nothing was looked at for
+  int mismatches = 0;                         ///< robust segments that began elsewhere than planned, so were not open
+  std::chrono::duration<double> plan_time{};  ///< time that the first plan took; 0 if it never came to be
   std::chrono::duration<double> planning_time{};  ///< time that all plans took, with one that ran out of time
   std::chrono::duration<double> total_time{};
   Trajectory observed;  ///< before the first action and after each, and after each rest
@@ -116,8 +120,9 @@ class Execution {
   Result<void> observe();
 
   /// Plans from x(), with fresh noise. `objective`: the setup's, or what a controller makes of it for this plan.
+  /// `weigh_robustness`: see Problem.
   Result<void> plan(const ControlSequence& initial, int iterations, const physics_pool::Objective& objective,
-                    std::vector<double> u_before = {});
+                    std::vector<double> u_before = {}, bool weigh_robustness = true);
 
   /// Executes u_0, removes it and x_0 from the plan, observes.
   Result<void> act();

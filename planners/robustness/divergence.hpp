@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "physics_pool/task/task_geometry.hpp"
+#include "planners/api/robustness.hpp"
 
 namespace jostle::planners {
 
@@ -52,17 +53,6 @@ double segment_metric(std::span<const double> steps, int p, int q);
 /// Returns the largest product over worlds. The product of each step's worst world would be looser, as no world need be
 /// the worst in every step. `steps`: [N_w + 1][N].
 double segment_metric(std::span<const std::vector<double>> steps, int p, int q);
-
-/// An E-hat of few trajectories, and how far it can be trusted.
-struct Estimate {
-  double value = 1.0;
-  /// Standard error of the value over the choice of the N_c starts, by the jackknife: each start is left out once, of
-  /// all worlds together. Of a maximum it tells less, since a maximum over more starts can only be larger. Infinite for
-  /// fewer than 2 trajectories, and where the value is.
-  double spread = 0.0;
-
-  bool operator==(const Estimate&) const = default;
-};
 
 /// Returns E-hat^r between two borders with its spread. `worlds`: as above, with the same starts in the same order.
 Estimate estimate(Metric metric, std::span<const Deviations> worlds, int p, int q);

@@ -1,5 +1,7 @@
 #include "planners/robustness/segments.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/graph/adjacency_list.hpp>
 #include <boost/graph/dag_shortest_paths.hpp>
@@ -71,6 +73,17 @@ std::vector<Segment> find_segments(std::span<const std::vector<double>> steps, d
   }
   std::ranges::reverse(segments);
   return segments;
+}
+
+std::string to_text(std::span<const Segment> segments, int under_way) {
+  std::string text;
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    const auto& [from, to, is_robust, metric] = segments[i];
+    const std::string one = fmt::format("{} {}-{}", is_robust ? "open" : "closed", from, to);
+    text += text.empty() ? "" : ", ";
+    text += static_cast<int>(i) == under_way ? "[" + one + "]" : one;
+  }
+  return text;
 }
 
 }  // namespace jostle::planners

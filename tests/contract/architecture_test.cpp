@@ -73,8 +73,8 @@ const std::vector<Room> kArrows{
      {"idl/types/", "physics_pool/task/", "physics_pool/objective/", "physics_pool/api/", "physics_pool/sampling/",
       "physics_pool/coarse/", "planners/api/", "planners/pbsto/", "planners/search/"}},
     {"planners/",
-     {"idl/types/", "physics_pool/task/", "physics_pool/objective/", "physics_pool/api/", "robot_bridge/api/",
-      "perception/api/"}},
+     {"idl/types/", "physics_pool/task/", "physics_pool/objective/", "physics_pool/api/", "physics_pool/uncertainty/",
+      "robot_bridge/api/", "perception/api/"}},
 };
 
 // The families of services, lowest first: each may include those before it, and every other room.

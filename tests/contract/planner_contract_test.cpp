@@ -7,9 +7,11 @@
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "planners/pbsto/pbsto.hpp"
+#include "planners/robustness/robust_sto.hpp"
 #include "planners/sampling/sampling.hpp"
 #include "tests/support/batches.hpp"
 #include "tests/support/bowl_pool.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::tests {
 namespace {
@@ -42,6 +44,7 @@ struct Settings {
 struct Implementation {
   const char* name;
   std::unique_ptr<Planner> (*make)(Pool& pool, const Settings& settings, OnProgress on_progress);
+  bool ends_at_success = true;  // otherwise at what it takes for the end of a plan
 };
 
 template <PbstoOptions::Update update>
@@ -64,6 +67,20 @@ std::unique_ptr<Planner> sampling(Pool& pool, const Settings& settings, OnProgre
                                 .lambda = settings.lambda,
                                 .step_duration = settings.step_duration};
   return std::make_unique<SamplingPlanner>(pool, options, std::move(on_progress));
+}
+
+// Its worlds and starts have tests of their own (robust_sto_test.cpp): a bowl is the same in every world.
+template <int starts>
+std::unique_ptr<Planner> robust_sto(Pool& pool, const Settings& settings, OnProgress on_progress) {
+  static const physics_pool::Scene scene = starts > 0 ? small_scene() : target_only();
+  static const physics_pool::TaskGeometry geometry(scene);
+  const PbstoOptions optimizer{.rollouts = settings.rollouts,
+                               .sigma = settings.sigma,
+                               .limit = settings.limit,
+                               .step_duration = settings.step_duration};
+  // No final cost is so low: a plan that satisfies it would be done before the suite has seen anything.
+  const planners::RobustStoOptions options{.starts = starts, .worlds = 1, .terminal_cost = -1.0};
+  return std::make_unique<planners::RobustSto>(pool, scene, geometry, optimizer, options, std::move(on_progress));
 }
 
 class PlannerContract : public ::testing::TestWithParam<Implementation> {
@@ -102,6 +119,7 @@ void expect_equal(const Plan& a, const Plan& b) {
   EXPECT_EQ(a.iterations, b.iterations);
   EXPECT_EQ(a.rollouts, b.rollouts);
   EXPECT_EQ(a.denials, b.denials);
+  EXPECT_EQ(a.robustness, b.robustness);
 }
 
 TEST_P(PlannerContract, EqualProblemsGiveBitEqualPlans) {
@@ -204,6 +222,7 @@ TEST_P(PlannerContract, NoIterationsGiveTheInitialControlsAndTheirCost) {
 }
 
 TEST_P(PlannerContract, EndsAtTheFirstSuccess) {
+  if (!GetParam().ends_at_success) GTEST_SKIP() << "it rolls every trajectory out to its end";
   bowl.can_succeed = true;
   Problem problem = bowl_problem(1000);
   problem.objective.success_cost = 0.5 * initial_cost();
@@ -366,6 +385,10 @@ const auto kMppi = ::testing::Values(Implementation{"mppi", &sampling<SamplingOp
 const auto kCem = ::testing::Values(Implementation{"cem", &sampling<SamplingOptions::Method::kCem>});
 const auto kIcem = ::testing::Values(Implementation{"icem", &sampling<SamplingOptions::Method::kIcem>});
 
+const auto kByCost = ::testing::Values(Implementation{"by_cost", &robust_sto<0>, false});
+const auto kRobust = ::testing::Values(Implementation{"by_cost", &robust_sto<0>, false},
+                                       Implementation{"robust", &robust_sto<2>, false});
+
 INSTANTIATE_TEST_SUITE_P(Pbsto, PlannerContract, kPbsto, kName);
 INSTANTIATE_TEST_SUITE_P(Pbsto, PlannerOnPhysicsContract, kPbsto, kName);
 INSTANTIATE_TEST_SUITE_P(Predictive, PlannerContract, kPredictive, kName);
@@ -376,6 +399,8 @@ INSTANTIATE_TEST_SUITE_P(Cem, PlannerContract, kCem, kName);
 INSTANTIATE_TEST_SUITE_P(Cem, PlannerOnPhysicsContract, kCem, kName);
 INSTANTIATE_TEST_SUITE_P(Icem, PlannerContract, kIcem, kName);
 INSTANTIATE_TEST_SUITE_P(Icem, PlannerOnPhysicsContract, kIcem, kName);
+INSTANTIATE_TEST_SUITE_P(RobustSto, PlannerContract, kByCost, kName);
+INSTANTIATE_TEST_SUITE_P(RobustSto, PlannerOnPhysicsContract, kRobust, kName);
 
 }  // namespace
 }  // namespace jostle::tests

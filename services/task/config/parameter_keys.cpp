@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <limits>
@@ -281,6 +283,100 @@ void add_adaptive(std::vector<ParameterKey>& keys) {
       [](auto& p) -> auto& { return p.controller.adaptive.max_actions; }));
 }
 
+ParameterKey judged_objects() {
+  using Judged = planners::RobustStoOptions::Judged;
+  static constexpr std::array kJudged{Judged::kAll, Judged::kTarget, Judged::kMoved};
+  ParameterKey judged =
+      bare("robust.judged", "", 0, 0,
+           "Whose deviations metrics are made of: all objects (thesis), the target, or the target and "
+           "what the plan itself moves (Sec. 8.1.5).");
+  judged.words = {"all", "target", "moved"};
+  judged.get = [words = judged.words](const Parameters& p) {
+    const auto found = std::ranges::find(kJudged, p.controller.robust.planner.judged);
+    return ParameterValue(words[static_cast<std::size_t>(found - kJudged.begin())]);
+  };
+  judged.set = [words = judged.words](Parameters& p, const ParameterValue& value) {
+    const auto found = std::ranges::find(words, std::get<std::string>(value));
+    p.controller.robust.planner.judged = kJudged[static_cast<std::size_t>(found - words.begin())];
+  };
+  return judged;
+}
+
+void add_robust(std::vector<ParameterKey>& keys) {
+  constexpr double kMostStarts = 10'000;
+  const auto number = [&](const char* name, const char* unit, double least, double most, const char* meaning,
+                          auto access) {
+    keys.push_back(key(std::string("robust.") + name, unit, least, most, meaning, access));
+  };
+  number(
+      "starts", "", 0, kMostStarts,
+      "Starts beside the seen state, per world (N_c of Eq. 4.18); 0 plans by costs alone.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.starts; });
+  number(
+      "worlds", "", 0, kMostStarts, "Realizations beside the planning world (N_w of Eq. 4.23); `cp` has none.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.worlds; });
+  number(
+      "start_position", "m", 0, 1, "Standard deviation of the starts' positions.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.spread.position; });
+  number(
+      "start_rotation", "rad", 0, 3, "Standard deviation of the starts' headings.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.spread.rotation; });
+  number(
+      "least_mass", "kg", 1e-3, 1e3, "m_l of Eq. 4.22.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.bounds.least_mass; });
+  number(
+      "most_mass", "kg", 1e-3, 1e3, "m_u of Eq. 4.22.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.bounds.most_mass; });
+  number(
+      "least_friction", "", 1e-3, 10, "mu_l of Eq. 4.22.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.bounds.least_friction; });
+  number(
+      "most_friction", "", 1e-3, 10, "mu_u of Eq. 4.22.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.bounds.most_friction; });
+  number(
+      "size", "m", 0, 0.1, "How much longer or shorter each measure of an object may be (p_l, p_u of Eq. 4.22).",
+      [](auto& p) -> auto& { return p.controller.robust.planner.bounds.size; });
+  keys.push_back(judged_objects());
+  number(
+      "expected_weight", "cost", 0, kNoMost, "v_e of Eq. 4.28.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.expected_weight; });
+  number(
+      "maximal_weight", "cost", 0, kNoMost, "v_m of Eq. 4.28.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.maximal_weight; });
+  number(
+      "cost_weight", "", 1e-9, 1e9, "v_j of Eq. 4.28.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.cost_weight; });
+  number(
+      "terminal_cost", "cost", 0, kNoMost, "Largest weighted final cost of a feasible plan (alpha of Eq. 4.31).",
+      [](auto& p) -> auto& { return p.controller.robust.planner.terminal_cost; });
+  number(
+      "tolerance", "", 0, 10, "How far above 1 a metric may be of what still counts as robust.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.tolerance; });
+  number(
+      "robust_edge", "", 1e-9, 1e9, "c_ro of the robustness graph (Sec. 4.2).",
+      [](auto& p) -> auto& { return p.controller.robust.planner.graph.robust; });
+  number(
+      "other_edge", "", 1e-9, 1e9, "c_nr of the robustness graph, per step.",
+      [](auto& p) -> auto& { return p.controller.robust.planner.graph.not_robust; });
+  number(
+      "horizon", "", 1, physics_pool::kMaxSteps, "Actions of a plan (N).",
+      [](auto& p) -> auto& { return p.controller.robust.horizon; });
+  number(
+      "iterations", "", 0, kManyIterations, "Iterations of the first plan, at most (I_max of Alg. 5).",
+      [](auto& p) -> auto& { return p.controller.robust.iterations; });
+  number(
+      "mpc_iterations", "", 0, kManyIterations, "Iterations of every plan while the robot waits, at most.",
+      [](auto& p) -> auto& { return p.controller.robust.mpc_iterations; });
+  number(
+      "max_actions", "", 1, kManyIterations,
+      "Actions of `cc`, and of `ocl` in its last segment, after which the task has failed.",
+      [](auto& p) -> auto& { return p.controller.robust.max_actions; });
+  number(
+      "interface_distance", "m", 0, 1e3,
+      "Where segments of `ocl` meet: closed-loop control ends, and open-loop execution begins, this near to the plan.",
+      [](auto& p) -> auto& { return p.controller.robust.interface_distance; });
+}
+
 }  // namespace
 
 std::string ParameterKey::wanted() const {
@@ -308,6 +404,7 @@ std::vector<ParameterKey> parameter_keys() {
   add_control(keys);
   add_mpc(keys);
   add_adaptive(keys);
+  add_robust(keys);
   return keys;
 }
 

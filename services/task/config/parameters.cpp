@@ -63,6 +63,7 @@ void read(const YAML::Node& root, const std::string& origin, Parameters& paramet
   control.step_duration = parameters.controller.mpc.step_duration = parameters.planner.step_duration;
   control.min_steps = parameters.planner.min_steps;
   parameters.controller.adaptive.step_duration = parameters.planner.step_duration;
+  parameters.controller.robust.step_duration = parameters.planner.step_duration;
 }
 
 // What one key alone cannot be wrong in.
@@ -77,6 +78,15 @@ Result<void> check(const Parameters& parameters, const std::string& origin) {
   if (adaptive.least_actions > adaptive.most_actions) {
     return invalid(origin + ": adaptive.least_actions", std::to_string(adaptive.least_actions),
                    fmt::format("at most adaptive.most_actions, {}", adaptive.most_actions));
+  }
+  const physics_pool::ParameterBounds& bounds = parameters.controller.robust.planner.bounds;
+  if (bounds.least_mass > bounds.most_mass) {
+    return invalid(origin + ": robust.least_mass", fmt::format("{}", bounds.least_mass),
+                   fmt::format("at most robust.most_mass, {}", bounds.most_mass));
+  }
+  if (bounds.least_friction > bounds.most_friction) {
+    return invalid(origin + ": robust.least_friction", fmt::format("{}", bounds.least_friction),
+                   fmt::format("at most robust.most_friction, {}", bounds.most_friction));
   }
   if (planner.scales.empty()) return invalid(origin + ": planner.scales", "an empty list", "at least one factor");
   if (double(planner.rollouts) * planner.screening > physics_pool::kMaxSamples) {

@@ -328,6 +328,7 @@ void Coordinator::note(const planners::ControlEvent& event, const physics_pool::
   if (event.plan && event.plan->chosen >= 0) {
     feedback_.speed(event.plan->choices[static_cast<std::size_t>(event.plan->chosen)].speed);
   }
+  feedback_.segments(planners::to_text(event.outcome.segments, event.outcome.segment));
   if (event.phase == planners::Phase::kPlanning) rollouts_before_ = feedback_.rollouts();
   if (event.observed && !event.observed->q.empty()) {
     feedback_.target_distance(geometry.kind->distance(geometry, *event.observed));

@@ -18,8 +18,8 @@ constexpr int kWorkerRank = 6;   // of the first worker: all else is more import
 
 void Display::show(const jostle_msgs::msg::Feedback& feedback) {
   measure_rates(feedback);
-  const std::string news =
-      fmt::format("{} {} {} {}", feedback.phase(), feedback.iteration(), feedback.actions(), feedback.replans());
+  const std::string news = fmt::format("{} {} {} {} {}", feedback.phase(), feedback.iteration(), feedback.actions(),
+                                       feedback.replans(), feedback.segments());
   const bool is_news = std::exchange(last_news_, news) != news;
   if (line_.live() || is_news) line_.draw(text(feedback));
 }
@@ -47,6 +47,8 @@ std::string Display::text(const jostle_msgs::msg::Feedback& feedback) {
   if (feedback.speed() > 0) {  // of controllers that choose one
     parts.insert(parts.begin() + kAfterTarget, {fmt::format("speed {:>5.1f} cm/s", 100 * feedback.speed()), 1});
   }
+  // Of controllers that look only where they must.
+  if (!feedback.segments().empty()) parts.push_back({feedback.segments(), 1});
   parts.insert(parts.end(), workers.begin(), workers.end());
   const std::size_t width = line_.live() ? line_.width() : std::string::npos;
   return common::fitted_line(std::move(parts), width);

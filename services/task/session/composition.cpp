@@ -56,8 +56,8 @@ std::unique_ptr<planners::Planner> Composition::make_planner(const planners::OnP
     if (guided_result) return std::move(guided_result).value();
     spdlog::warn("planned without guidance: {}", guided_result.error().message);
   }
-  return planners::make_planner(*controller_, *pool_, geometry(), parameters.planner, parameters.controller,
-                                on_progress);
+  return planners::make_planner(*controller_, *pool_, parts_.belief, geometry(), parameters.planner,
+                                parameters.controller, on_progress);
 }
 
 Result<State> Composition::moved_apart(const State& x) const {

@@ -20,7 +20,6 @@ class Run {
         execution_(setup, options.step_duration, on_event, std::move(stop)),
         to_goal_(setup.objective),
         to_state_(setup.objective) {
-    to_goal_["obstruction"].weight = to_state_["obstruction"].weight = 0.0;  // Chapter 4 has no such cost
     to_goal_["state"].values.clear();
     to_state_["goal"].weight = to_state_["pads"].weight = 0.0;
   }

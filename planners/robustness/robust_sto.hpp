@@ -2,7 +2,6 @@
 /// \file
 /// Robust sampling-based trajectory optimization (Alg. 5).
 
-#include "physics_pool/scene/scene.hpp"
 #include "physics_pool/task/task_geometry.hpp"
 #include "physics_pool/uncertainty/realizations.hpp"
 #include "planners/api/planner.hpp"
@@ -54,6 +53,9 @@ struct RobustStoOptions {
 /// * Deviations are from the planned trajectory in every world, because Eq. 4.42 counts no other. So in a realization
 /// they
 ///   have in them what its other parameters do to the trajectory itself.
+/// * With the optimizer's `freeze` what rests has no freedom until it is touched, in all rollouts alike; then the
+/// metric of
+///   what nothing touches is exactly 1.
 /// * The vector that goes into the graph has the metrics of every world; a segment is as bad as in its worst world.
 ///
 /// `Plan::cost` is J_R, Problem::weigh_robustness off gives a plan by J alone ("a version of Alg. 5 without robustness

@@ -99,7 +99,7 @@ int main(int argc, char** argv) {
   app.add_flag("--json", json, "Print JSON");
   app.add_flag("--markdown", markdown, "Print a table as docs/parameters.md has it");
   app.add_option("--file", file_of,
-                 "Print a complete parameter file of this kind, grasping, pushing or adaptive, to start from")
+                 "Print a complete parameter file of this kind, grasping, pushing, robust or adaptive, to start from")
       ->excludes("keys");
   app.footer("Exit codes: 0 done, 2 an unknown key.");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
@@ -113,7 +113,7 @@ int main(int argc, char** argv) {
   if (!file_of.empty()) {
     const auto found = std::ranges::find(*standards_result, file_of, &Standard::name);
     if (found == standards_result->end())
-      return fail(invalid("--file", "'" + file_of + "'", "grasping, pushing or adaptive"));
+      return fail(invalid("--file", "'" + file_of + "'", "grasping, pushing, robust or adaptive"));
     fmt::print("{}", to_yaml(found->parameters));
     return common::kExitOk;
   }

@@ -14,6 +14,7 @@
 
 #include "physics_pool/robot/kinematics.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
+#include "physics_pool/scenarios/chapter4.hpp"
 #include "physics_pool/scenarios/chapter5.hpp"
 #include "physics_pool/scenarios/push.hpp"
 #include "physics_pool/scene/scene.hpp"
@@ -35,7 +36,7 @@ struct Arguments {
   physics_pool::GenerateOptions generate;
   physics_pool::GenerateAdaptiveOptions adaptive;
   physics_pool::GeneratePushOptions push;
-  std::optional<int> objects;  // 15 of Chapter 3, 8 of Chapter 5, 3 of Chapter 7
+  std::optional<int> objects;  // 15 of Chapter 3, 9 of Chapter 4, 8 of Chapter 5, 3 of Chapter 7
   std::string task = "wide";
   std::string shape = "cylinder";
   std::string input, output = "-";
@@ -66,6 +67,11 @@ Result<Scene> make_scene(Arguments arguments) {
   if (arguments.chapter == 3) {
     arguments.generate.objects = arguments.objects.value_or(arguments.generate.objects);
     return physics_pool::generate_chapter3(arguments.generate);
+  }
+  if (arguments.chapter == 4) {
+    physics_pool::GenerateShelfOptions shelf{.seed = arguments.generate.seed};
+    shelf.objects = arguments.objects.value_or(shelf.objects);
+    return physics_pool::generate_chapter4(shelf);
   }
   if (arguments.chapter == 5) {
     using physics_pool::AdaptiveTask;
@@ -251,15 +257,15 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
   arguments.generates = generates;
   generates
       ->add_option("--chapter", arguments.chapter,
-                   "whose scenes: 3, Sec. 3.3.1, grasping; 5, Sec. 5.6, tasks of different accuracy; 6, Sec. 6.3.3, "
-                   "pushing round an obstacle; 7, Sec. 7.4, pushing among sliders")
-      ->check(CLI::IsMember({3, 5, 6, 7}))
+                   "whose scenes: 3, Sec. 3.3.1, grasping; 4, Sec. 4.5.3, the same in a shelf; 5, Sec. 5.6, tasks of "
+                   "different accuracy; 6, Sec. 6.3.3, pushing round an obstacle; 7, Sec. 7.4, pushing among sliders")
+      ->check(CLI::IsMember({3, 4, 5, 6, 7}))
       ->capture_default_str();
   common::add_seed_option(*generates, "--seed", arguments.generate.seed, "equal seeds give equal scenes");
-  generates->add_option(
-      "--objects", arguments.objects,
-      "objects beside the target: 0 to 40, default 15, of Chapter 3; 0 to 20, default 8, of the clutter of Chapter 5; "
-      "0 to 3, default 3, of Chapter 7");
+  generates->add_option("--objects", arguments.objects,
+                        "objects beside the target: 0 to 40, default 15, of Chapter 3; 2 to 15, default 9, of Chapter "
+                        "4; 0 to 20, default 8, of the clutter of Chapter 5; "
+                        "0 to 3, default 3, of Chapter 7");
   generates
       ->add_option("--task", arguments.task,
                    "of Chapter 5: wide, a wide table and a large goal region; strip, a thin strip and a small one; "

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <vector>
 
 #include "idl/files/files.hpp"
@@ -40,10 +41,15 @@ void paste(Picture& whole, const Picture& part, int x, int y) {
   }
 }
 
-Result<void> write_png(const std::filesystem::path& file, const Picture& picture) {
+Result<void> write_png(const std::filesystem::path& file, const Picture& picture, double dots_per_metre) {
   std::vector<unsigned char> bytes;
+  lodepng::State state;
+  state.info_raw.colortype = state.info_png.color.colortype = LCT_RGB;
+  state.info_png.phys_defined = dots_per_metre > 0 ? 1 : 0;
+  state.info_png.phys_x = state.info_png.phys_y = static_cast<unsigned>(std::lround(dots_per_metre));
+  state.info_png.phys_unit = 1;  // per metre
   const unsigned problem = lodepng::encode(bytes, picture.rgb, static_cast<unsigned>(picture.width),
-                                           static_cast<unsigned>(picture.height), LCT_RGB);
+                                           static_cast<unsigned>(picture.height), state);
   if (problem == 0) return files::write(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   return Error{Code::kInternal, fmt::format("{}: picture of {}x{} not encoded: {}", file.string(), picture.width,
                                             picture.height, lodepng_error_text(problem))};

@@ -28,7 +28,8 @@ Picture blank_picture(int width, int height, std::uint8_t grey);
 /// if it does not fit.
 void paste(Picture& whole, const Picture& part, int x, int y);
 
+/// `dots_per_metre`: how large it is on paper; 0 says nothing of it.
 /// Error kIo: the file cannot be written.
-Result<void> write_png(const std::filesystem::path& file, const Picture& picture);
+Result<void> write_png(const std::filesystem::path& file, const Picture& picture, double dots_per_metre = 0.0);
 
 }  // namespace jostle::physics_pool

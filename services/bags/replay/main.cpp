@@ -75,7 +75,8 @@ int main(int argc, char** argv) {
   Arguments arguments;
   app.add_option("bag", arguments.bag, "Folder or file that `jostle run --record` or `jostle record` left")->required();
   app.add_option("--goal", arguments.goal, "Only this run of the bag (default: all)");
-  common::suggest(app.add_option("--controller", arguments.controller, "What if another had decided: or, nr, mpc, ol, rol, cp, cc, ocl"),
+  common::suggest(app.add_option("--controller", arguments.controller,
+                                 "What if another had decided: or, nr, mpc, ol, rol, cp, cc, ocl"),
                   planners::controller_names());
   app.add_option(
          "--set", arguments.options.settings,

@@ -285,15 +285,19 @@ TEST_F(ViewOfABag, RefusesWhatCannotBeSetAndTellsFollowersOfTheRest) {
   });
 }
 
-class View : public RunFixture {};
+class View : public RunFixture {
+ protected:
+  static std::uint16_t port_in(const std::string& said) {
+    std::smatch port;
+    if (!std::regex_search(said, port, std::regex("http://127.0.0.1:([0-9]+)/"))) throw std::runtime_error(said);
+    return static_cast<std::uint16_t>(std::stoi(port[1]));
+  }
+};
 
 TEST_F(View, ShowsWhatIsLiveAsItIsOnTheWire) {
   const auto viewing = program("jostle_view", {"--port", "0"});
   ASSERT_TRUE(viewing->says("ready", kPatience)) << viewing->err();
-  std::smatch port;
-  const std::string said = viewing->err();
-  ASSERT_TRUE(std::regex_search(said, port, std::regex("http://127.0.0.1:([0-9]+)/"))) << said;
-  ViewClient viewer(static_cast<std::uint16_t>(std::stoi(port[1])));
+  ViewClient viewer(port_in(viewing->err()));
 
   const auto participant = taken(wire::Participant::open({.domain = domain}));
   wire::RawWriter writer(
@@ -306,6 +310,19 @@ TEST_F(View, ShowsWhatIsLiveAsItIsOnTheWire) {
   EXPECT_EQ(text_of(viewer.next_sample().sample()), "abc");  // kept for whoever subscribes later
   viewing->signal(SIGINT);
   EXPECT_EQ(viewing->wait(kPatience), 0) << viewing->err();
+}
+
+TEST_F(View, LastsAsLongAsTheRunThatWantsIt) {
+  start({easy, "--workers", "2", "--rate", "1", "--parameters", plain, "--view", "0"});
+  ASSERT_TRUE(run->says("shown at", kPatience)) << run->err();
+  ViewClient viewer(port_in(run->err()));
+  viewer.subscribe(0, viewer.channel("/objects/states")["id"].get<std::uint32_t>());
+  viewer.next_sample();
+  const pid_t viewing = run->child("jostle_view");
+  ASSERT_GT(viewing, 0);
+  run->signal(SIGINT);
+  EXPECT_EQ(run->wait(kPatience), 130) << run->err();
+  EXPECT_FALSE(lives(viewing));
 }
 
 TEST_F(View, SaysWhatIsWrong) {

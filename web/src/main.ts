@@ -70,7 +70,8 @@ function takeFeedback(feedback: Feedback): void {
   }
   lastCount = { time: elapsed, rollouts };
   const cost = Number.isFinite(feedback.cost) ? feedback.cost : null;
-  strips.add({ time: elapsed, values: [cost, rate, feedback.workers.filter(({ alive }) => alive).length] });
+  // Between goals nothing counts.
+  if (feedback.phase !== "idle") strips.add({ time: elapsed, values: [cost, rate, feedback.workers.filter(({ alive }) => alive).length] });
   element("phase").textContent = `${feedback.phase}, ${feedback.actions} actions, ${feedback.replans} plans, ` +
     `${(1000 * feedback.target_distance).toFixed(0)} mm to go`;
   if (feedback.trouble && feedback.trouble !== lastWords.trouble) tell(feedback.trouble, true);

@@ -15,6 +15,8 @@ namespace {
 using namespace jostle;
 using namespace jostle::task;
 
+constexpr std::uint16_t kViewPort = 8765;  // where Foxglove looks
+
 int fail(const Error& error, int code) {
   fmt::print(stderr, "jostle run: {}\n", error.message);
   return code;
@@ -71,6 +73,10 @@ int main(int argc, char** argv) {
          "How the simulated world's noise grows with speed (b of Eq. 5.10; thesis: 0.05, 0.075, 0.1), and, unless\n"
          "--set adaptive.noise=… says otherwise, how the planner believes it to (default: 0, and the parameter's)")
       ->check(CLI::Range(0.0, 1.0));
+  auto* view = app.add_option("--view", options.view,
+                              "Show the run in a browser and in Foxglove, at this port (default: 8765; 0: any)")
+                   ->expected(0, 1)
+                   ->type_name("PORT");
   app.add_option("--rate", options.rate, "World seconds per second while acting; 0: as fast as possible")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
@@ -85,6 +91,7 @@ int main(int argc, char** argv) {
          "NatNet (docs/perception.md)")
       ->capture_default_str();
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
+  if (*view && view->results().front().empty()) options.view = kViewPort;
   if (options.pool == "threads" && options.workers == 0) {
     return fail({Code::kInvalidArgument, "--workers: got 0, wanted at least 1 thread"}, common::kExitUsage);
   }

@@ -42,6 +42,7 @@ struct RunOptions {
   std::optional<int> domain;
   std::filesystem::path json, picture;  ///< empty: none
   std::filesystem::path record;         ///< a bag's folder; empty: nothing is recorded
+  std::optional<std::uint16_t> view;    ///< port where the run is shown, 0: any; empty: it is not
 };
 
 /// What a command line says of a goal, as it was typed.

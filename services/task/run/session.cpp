@@ -42,6 +42,7 @@ Result<std::unique_ptr<Session>> Session::start(const RunOptions& options, Watch
   std::unique_ptr<Session> session(
       new Session(options, std::move(watcher), *participant_result, std::move(claim_result).value(), *folder_result));
   if (auto ok = session->start_recorder(); !ok) return ok.error();
+  if (auto ok = session->start_viewer(); !ok) return ok.error();
   if (auto ok = session->start_processes(); !ok) return ok.error();
   return session;
 }
@@ -63,6 +64,7 @@ Session::~Session() {
   for (WorldProcess& one : world_) one.process.terminate();
   if (coordinator_process_) coordinator_process_->terminate();
   if (recorder_process_) recorder_process_->terminate();
+  if (viewer_process_) viewer_process_->terminate();
   workers_.clear();
   world_.clear();
   coordinator_process_.reset();
@@ -74,26 +76,41 @@ Session::~Session() {
 // Before everything else, so that it hears everything else.
 Result<void> Session::start_recorder() {
   if (options_.record.empty()) return {};
-  auto process_result = common::ChildProcess::start(
-      program("record"),
-      {"--output", options_.record.string(), "--until-result", "--domain", std::to_string(participant_.domain()),
-       "--die-with-parent", std::to_string(getpid()), "--json", (folder_ / "record.json").string()},
-      folder_ / "record.log");
+  auto process_result = start_ready(
+      "record", {"--output", options_.record.string(), "--until-result", "--json", (folder_ / "record.json").string()},
+      "the recorder");
   if (!process_result) return process_result.error();
   recorder_process_ = std::move(process_result).value();
-  const auto deadline = Clock::now() + kStart;
-  while (!recorder_process_->has_said("ready")) {
-    const auto ended = recorder_process_->wait_for(kTick);
-    if (ended || Clock::now() >= deadline) {
-      const bool refused = ended && ended->code == common::kExitUsage;
-      const Error error{refused ? Code::kInvalidArgument : Code::kUnavailable,
-                        fmt::format("the recorder {}:\n{}", ended ? "did not start" : "is not ready",
-                                    recorder_process_->last_words())};
-      recorder_process_.reset();
-      return error;
-    }
-  }
   return {};
+}
+
+Result<void> Session::start_viewer() {
+  if (!options_.view) return {};
+  auto process_result = start_ready("view", {"--port", std::to_string(*options_.view)}, "the viewers' server");
+  if (!process_result) return process_result.error();
+  viewer_process_ = std::move(process_result).value();
+  const std::string line = viewer_process_->last_line();
+  notice("shown at " + line.substr(std::min(line.size(), line.find("http:"))));
+  return {};
+}
+
+Result<common::ChildProcess> Session::start_ready(const std::string& program_name, std::vector<std::string> arguments,
+                                                  const std::string& title) {
+  arguments.insert(arguments.end(),
+                   {"--domain", std::to_string(participant_.domain()), "--die-with-parent", std::to_string(getpid())});
+  auto process_result =
+      common::ChildProcess::start(program(program_name.c_str()), arguments, folder_ / (program_name + ".log"));
+  if (!process_result) return process_result.error();
+  const auto deadline = Clock::now() + kStart;
+  while (!process_result->has_said("ready")) {
+    const auto ended = process_result->wait_for(kTick);
+    if (!ended && Clock::now() < deadline) continue;
+    const bool refused = ended && ended->code == common::kExitUsage;
+    return Error{
+        refused ? Code::kInvalidArgument : Code::kUnavailable,
+        fmt::format("{} {}:\n{}", title, ended ? "did not start" : "is not ready", process_result->last_words())};
+  }
+  return process_result;
 }
 
 Result<void> Session::finish_recording() {

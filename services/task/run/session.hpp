@@ -50,6 +50,7 @@ class Witness {
 ///   one that is silent is news: it may be slow. The coordinator's silence ends the run when it lasts,
 ///   for its result is waited for; the world's when the coordinator waits for it
 ///   a recorder that ends early is news, and the run goes on
+///   a viewer that ends early is no news to it
 ///
 /// Destroying it ends every process it started and removes its files.
 class Session {
@@ -81,6 +82,10 @@ class Session {
           std::filesystem::path folder);
 
   Result<void> start_recorder();
+  Result<void> start_viewer();
+  // One that others wait for: returns once it has said "ready".
+  Result<common::ChildProcess> start_ready(const std::string& program_name, std::vector<std::string> arguments,
+                                           const std::string& title);
   Result<void> start_processes();
   Result<common::ChildProcess> start_worker(std::size_t place);  // index among the workers
   Result<void> look_after();
@@ -122,7 +127,7 @@ class Session {
     common::ChildProcess process;
   };
   std::vector<WorldProcess> world_;
-  std::optional<common::ChildProcess> coordinator_process_, recorder_process_;
+  std::optional<common::ChildProcess> coordinator_process_, recorder_process_, viewer_process_;
 };
 
 }  // namespace jostle::task

@@ -77,11 +77,18 @@ test("a recorded run is seen, and its objects move", async () => {
   assert.ok(Math.hypot(end[0] - begin[0], end[1] - begin[1]) > 0.05, `target went from ${begin} to ${end}`);
 
   // Played on, it comes to where it ended, and something is drawn.
-  await page.evaluate(`void (document.getElementById("rate").value = "50", document.getElementById("rate").dispatchEvent(new Event("change")))`);
+  const setRate = (rate) =>
+    `{ const list = document.getElementById("rate"); list.value = "${rate}"; list.dispatchEvent(new Event("change")); }`;
+  await page.evaluate(setRate(50));
   await page.until(`${target}.cells[1].textContent === "${end[0].toFixed(4)}"`);
   assert.ok((await page.evaluate(`document.querySelector("#world canvas").width`)) > 300);
   assert.deepEqual(page.errors, []);
   if (process.env.JOSTLE_SCREENSHOT) {
+    await page.evaluate(setRate(0.5));
+    await press("Home");
+    await press(" ");
+    await page.until(`Number(document.getElementById("place").value) > 0.6 * Number(document.getElementById("place").max)`);
+    await press(" ");
     await page.evaluate("new Promise((done) => setTimeout(done, 1000))");
     const { data } = await page.call("Page.captureScreenshot", { format: "png" });
     writeFileSync(process.env.JOSTLE_SCREENSHOT, Buffer.from(data, "base64"));

@@ -14,9 +14,9 @@
 #include <set>
 
 #include "idl/types/time.hpp"
-#include "services/bags/play/control.hpp"
-#include "services/bags/play/progress.hpp"
 #include "services/bags/play/publisher.hpp"
+#include "services/bags/playback/control.hpp"
+#include "services/bags/playback/progress.hpp"
 #include "services/wire/dds/cdr.hpp"
 #include "services/wire/dds/endpoint_watch.hpp"
 #include "services/wire/dds/names.hpp"

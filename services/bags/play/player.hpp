@@ -11,10 +11,10 @@
 #include <string>
 
 #include "services/bags/format/bag_reader.hpp"
-#include "services/bags/play/lateness.hpp"
-#include "services/bags/play/playback.hpp"
 #include "services/bags/play/terminal.hpp"
 #include "services/bags/play/topic_plan.hpp"
+#include "services/bags/playback/lateness.hpp"
+#include "services/bags/playback/playback.hpp"
 #include "services/common/terminal/live_line.hpp"
 
 namespace jostle::bags {

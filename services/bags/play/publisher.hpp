@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "services/bags/play/lateness.hpp"
-#include "services/bags/play/playback.hpp"
 #include "services/bags/play/topic_plan.hpp"
+#include "services/bags/playback/lateness.hpp"
+#include "services/bags/playback/playback.hpp"
 #include "services/wire/dds/raw.hpp"
 
 namespace jostle::bags {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "services/bags/play/control.hpp"
+#include "services/bags/playback/control.hpp"
 #include "services/wire/dds/topics.hpp"
 
 namespace jostle::bags {

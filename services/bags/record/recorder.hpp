@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "services/bags/format/bag_writer.hpp"
-#include "services/bags/record/record_clock.hpp"
+#include "services/bags/listening/record_clock.hpp"
+#include "services/bags/listening/subscriptions.hpp"
 #include "services/bags/record/sample_queue.hpp"
-#include "services/bags/record/subscriptions.hpp"
 #include "services/wire/dds/raw.hpp"
 
 namespace jostle::bags {

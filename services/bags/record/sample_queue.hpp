@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "services/bags/format/message.hpp"
-#include "services/bags/record/record_clock.hpp"
+#include "services/bags/listening/record_clock.hpp"
 
 namespace jostle::bags {
 

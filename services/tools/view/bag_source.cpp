@@ -13,7 +13,7 @@
 
 #include "idl/types/time.hpp"
 #include "services/bags/format/definitions.hpp"
-#include "services/bags/play/playback.hpp"
+#include "services/bags/playback/playback.hpp"
 
 namespace jostle::tools {
 namespace {

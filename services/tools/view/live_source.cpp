@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "services/bags/format/definitions.hpp"
-#include "services/bags/record/record_clock.hpp"
-#include "services/bags/record/subscriptions.hpp"
+#include "services/bags/listening/record_clock.hpp"
+#include "services/bags/listening/subscriptions.hpp"
 
 namespace jostle::tools {
 

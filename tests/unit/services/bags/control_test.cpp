@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
-#include "services/bags/play/control.hpp"
-#include "services/bags/play/progress.hpp"
+#include "services/bags/playback/control.hpp"
+#include "services/bags/playback/progress.hpp"
 #include "tests/support/bags.hpp"
 #include "tests/support/temp_folder.hpp"
 

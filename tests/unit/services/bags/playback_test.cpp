@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "services/bags/play/lateness.hpp"
-#include "services/bags/play/playback.hpp"
+#include "services/bags/playback/lateness.hpp"
+#include "services/bags/playback/playback.hpp"
 #include "tests/support/bags.hpp"
 #include "tests/support/temp_folder.hpp"
 

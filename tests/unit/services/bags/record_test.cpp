@@ -4,8 +4,8 @@
 
 #include <thread>
 
+#include "services/bags/listening/sequence_set.hpp"
 #include "services/bags/record/sample_queue.hpp"
-#include "services/bags/record/sequence_set.hpp"
 #include "services/bags/selection.hpp"
 
 namespace jostle::tests {

@@ -1,4 +1,4 @@
-#include "services/bags/play/control.hpp"
+#include "services/bags/playback/control.hpp"
 
 #include "idl/types/time.hpp"
 

@@ -1,4 +1,4 @@
-#include "services/bags/play/read_ahead.hpp"
+#include "services/bags/playback/read_ahead.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "services/bags/record/subscriptions.hpp"
+#include "services/bags/listening/subscriptions.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include <set>
 #include <thread>
 
-#include "services/bags/record/sequence_set.hpp"
+#include "services/bags/listening/sequence_set.hpp"
 #include "services/wire/dds/endpoint_watch.hpp"
 #include "services/wire/dds/names.hpp"
 #include "services/wire/dds/raw.hpp"

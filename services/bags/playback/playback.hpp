@@ -11,8 +11,8 @@
 
 #include "idl/types/result.hpp"
 #include "services/bags/format/bag_reader.hpp"
-#include "services/bags/play/read_ahead.hpp"
-#include "services/bags/play/timeline.hpp"
+#include "services/bags/playback/read_ahead.hpp"
+#include "services/bags/playback/timeline.hpp"
 
 namespace jostle::bags {
 

@@ -1,4 +1,4 @@
-#include "services/bags/play/progress.hpp"
+#include "services/bags/playback/progress.hpp"
 
 #include <fmt/format.h>
 

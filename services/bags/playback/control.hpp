@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "idl/types/result.hpp"
-#include "services/bags/play/playback.hpp"
+#include "services/bags/playback/playback.hpp"
 
 namespace jostle::bags {
 

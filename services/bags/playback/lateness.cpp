@@ -1,4 +1,4 @@
-#include "services/bags/play/lateness.hpp"
+#include "services/bags/playback/lateness.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "services/bags/play/timeline.hpp"
+#include "services/bags/playback/timeline.hpp"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "services/bags/play/playback.hpp"
+#include "services/bags/playback/playback.hpp"
 
 #include "idl/types/time.hpp"
 

@@ -78,6 +78,7 @@ Result<QuasiStaticClutter> QuasiStaticClutter::make(const Scene& scene, const Cl
   }
   model.objects_.resize(model.bodies_.size());
   model.most_contacts_ = kContactsPerBody * (model.bodies_.size() + 4);
+  model.make_room();
   return model;
 }
 
@@ -179,10 +180,7 @@ void QuasiStaticClutter::advance(State& x, std::span<const double> u, double dur
     object.gone = q[2] < body.rest_height - kForeseen * 10;
     object.moved = false;
   }
-  // Here, and not when it is made: a copy of an empty vector has no room.
-  contacts_.reserve(most_contacts_);
-  before_.reserve(most_contacts_);
-  queue_.reserve(bodies_.size());
+  make_room();  // again: a copy of an empty vector has none
   contacts_.clear();
   const double way = approach_ * duration;
   const int substeps =
@@ -221,6 +219,12 @@ void QuasiStaticClutter::advance(State& x, std::span<const double> u, double dur
     v[1] = object.v.y();
     v[5] = object.w;
   }
+}
+
+void QuasiStaticClutter::make_room() {
+  contacts_.reserve(most_contacts_);
+  before_.reserve(most_contacts_);
+  queue_.reserve(bodies_.size());
 }
 
 void QuasiStaticClutter::place_robot() {

@@ -125,6 +125,7 @@ class QuasiStaticClutter {
 
   Result<void> take_robot(const Scene& scene);
   Result<void> take_fixtures(const Scene& scene);
+  void make_room();
   void place_robot();
   void find_contacts();
   void touch(int a, int b, int piece, const Touches& touches);

@@ -21,6 +21,7 @@ namespace {
 using physics_pool::BatchReply;
 using physics_pool::RolloutBatch;
 
+constexpr std::size_t kInitial = 0;       // the candidate that is the problem's own
 constexpr std::size_t kElites = 6;        // that later generations are drawn around
 constexpr std::size_t kMostJudged = 8;    // per iteration
 constexpr double kDifferent = 0.012;      // m: candidates whose hands are never farther apart are the same
@@ -162,7 +163,7 @@ class Guided {
   // A pure function of the indices, of the elites and of what the engine has judged.
   void make(int generation, std::size_t i, const std::vector<std::size_t>& elites, Candidate& candidate) const {
     const CandidateIndex index{.stream = stream_, .number = static_cast<std::uint32_t>(i)};
-    if (i == 0) {
+    if (i == kInitial) {
       candidate.controls = problem_.initial;
     } else if (i == 1) {
       candidate.controls = search_.best().controls;
@@ -215,15 +216,18 @@ class Guided {
     std::vector<RolloutBatch> batches;
     auto best_result = best_in_doubt(most);
     if (!best_result) return best_result.error();
-    for (const std::size_t i : *best_result) {
+    std::vector<std::size_t>& chosen = *best_result;
+    // A plan is never worse than what it began with. Last, for coarse physics has found better ones, it says.
+    if (search_.best().iterations == 0 && std::ranges::find(chosen, kInitial) == chosen.end()) {
+      chosen.push_back(kInitial);
+    }
+    for (const std::size_t i : chosen) {
       RolloutBatch one = search_.around(candidates_[i].controls);
       std::ranges::fill(one.law.sigma, 0.0);
       one.want_all_trajectories = true;
       batches.push_back(std::move(one));
     }
-    if (batches.empty()) {  // nothing that coarse physics can show, or nothing new
-      return search_.best().cost < physics_pool::kInfinity ? Result<void>{} : search_.consider(problem_.initial);
-    }
+    if (batches.empty()) return {};  // nothing new
     auto replies_result = search_.run_in_order(batches);
     if (!replies_result) return replies_result.error();
     for (std::size_t i = 0; i < batches.size(); ++i) {

@@ -21,9 +21,10 @@ struct GuidanceOptions {
 };
 
 /// An iteration draws candidates of several families (candidates.hpp), ranks them in generations by coarse physics, and
-/// has the engine judge the few best that differ, with full physics, in parallel. The engine alone decides: a candidate
-/// counts at the cost, and as the success, that the engine gave it. While that denies what coarse physics promised, the
-/// next iteration has more of them judged, and draws from states that the engine has been in as well.
+/// has the engine judge the few best that differ and, in the first iteration, the initial sequence, with full physics,
+/// in parallel. The engine alone decides: a candidate counts at the cost, and as the success, that the engine gave it.
+/// While that denies what coarse physics promised, the next iteration has more of them judged, and draws from states
+/// that the engine has been in as well.
 ///
 /// The plan is a pure function of the problem and of the engine's results in the candidates' order; neither clock nor
 /// number of threads or workers has a part in it.

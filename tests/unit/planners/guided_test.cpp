@@ -115,6 +115,18 @@ TEST_F(GuidedTest, PlanIsTheEnginesWord) {
   EXPECT_EQ(reply->outcomes[0].trajectory, plan.states);
 }
 
+TEST_F(GuidedTest, PlanIsNeverWorseThanWhatItBeganWith) {
+  const Plan good = planned(2, 2, problem());
+  Problem again = problem();
+  again.initial = good.controls;
+  again.objective.success_cost = 1e-3;  // nothing succeeds: no plan is taken for that alone
+  again.iterations = 1;
+  for (const std::uint32_t stream : {1u, 2u, 3u}) {
+    again.stream = stream;
+    EXPECT_LE(planned(2, 2, again).cost, good.cost) << stream;
+  }
+}
+
 TEST_F(GuidedTest, AnyNumberOfThreadsGivesTheSamePlanBitForBit) {
   Problem hard = problem();
   hard.objective.success_cost = 1e-3;  // nothing succeeds: every iteration has its part

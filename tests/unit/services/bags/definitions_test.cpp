@@ -75,7 +75,8 @@ TEST(DefinitionOf, KeepsWhatCommentsSay) {
       *definition_of("jostle_msgs/msg/ObjectState"),
       StartsWith("# Pose X_WB and velocity of body B.\nstring name\ngeometry_msgs/Pose pose  # world frame, m\n"));
   EXPECT_THAT(*definition_of("jostle_msgs/msg/VelocityCommand"), HasSubstr("float64[<=64] velocities"));
-  EXPECT_THAT(*definition_of("sensor_msgs/msg/CameraInfo"), HasSubstr("float64[9] k\n"));
+  EXPECT_THAT(*definition_of("sensor_msgs/msg/CameraInfo"),
+              HasSubstr("float64[9] k  # fx 0 cx 0 fy cy 0 0 1, pixels\n"));
 }
 
 TEST(DefinitionOf, IsThereForEveryMessageOfIdlAndDecodable) {

@@ -133,7 +133,8 @@ void add_guidance(std::vector<ParameterKey>& keys) {
   keys.push_back(key(
       "planner.guidance", "", 0, 100'000,
       "Candidates per iteration that coarse physics ranks, and of which the engine judges the few best; for a hand "
-      "that moves in the plane. 0: Alg. 1 without guidance.",
+      "that moves in the plane. Rollouts, scales, persistence, update, freezing and screening have no part in it. "
+      "0: Alg. 1 without guidance.",
       [](auto& p) -> auto& { return p.guidance.candidates; }));
   keys.push_back(key(
       "planner.guidance_generations", "", 1, 100,

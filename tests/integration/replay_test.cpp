@@ -100,9 +100,9 @@ TEST_F(RecordedRuns, DecideTheSameAgainToTheLastBit) {
   EXPECT_EQ(comparison["equal_actions"], comparison["actions"]);
   EXPECT_GE(comparison["actions"], report["actions"]);  // closing the hand is an action, too
 
-  EXPECT_EQ(program_ends("jostle_replay", {bag("run"), "--set", "planner.guidance=300"}), 1) << err;
+  EXPECT_EQ(program_ends("jostle_replay", {bag("run"), "--set", "control.initial_steps=10"}), 1) << err;
   EXPECT_THAT(out, HasSubstr("DIFFERS at plan"));
-  EXPECT_THAT(out, HasSubstr("why        planner.guidance: recorded 600, replayed 300"));
+  EXPECT_THAT(out, HasSubstr("why        control.initial_steps: recorded 12, replayed 10"));
 }
 
 bool has_fma() { return contents("/proc/cpuinfo").find(" fma ") != std::string::npos; }

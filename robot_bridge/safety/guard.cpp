@@ -53,7 +53,7 @@ Result<void> Guard::start(std::span<const double> u, double duration, std::stop_
 
 Result<bool> Guard::advance(std::stop_token stop) {
   if (!acts_) return true;
-  const auto over = robot_.advance(std::move(stop));
+  auto over = robot_.advance(std::move(stop));
   if (!over) {
     acts_ = false;
     over_ = -1.0;

@@ -163,8 +163,8 @@ void add_objective(std::vector<ParameterKey>& keys) {
     keys.push_back(std::move(weight));
     for (const physics_pool::TermParameter& parameter : kind->parameters) {
       const std::string part = parameter.name;
-      ParameterKey one = bare("objective." + name + "_" + part, parameter.unit, parameter.least, parameter.most,
-                              sentence(parameter.meaning));
+      ParameterKey one = bare(fmt::format("objective.{}_{}", name, part), parameter.unit, parameter.least,
+                              parameter.most, sentence(parameter.meaning));
       if (one.name == "goal_angle") one.also = "angle";
       one.get = [name, part](const Parameters& p) { return ParameterValue(p.objective.value(name, part)); };
       one.set = [name, part](Parameters& p, const ParameterValue& v) {

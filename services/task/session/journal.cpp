@@ -57,7 +57,7 @@ Result<void> Journal::Robot::start(std::span<const double> u, double duration, s
 }
 
 Result<bool> Journal::Robot::advance(std::stop_token stop) {
-  const auto over = robot_.advance(std::move(stop));
+  auto over = robot_.advance(std::move(stop));
   if (over && !*over) return over;
   if (over && !command_.empty()) {
     journal_.command_ = command_;

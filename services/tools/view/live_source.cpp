@@ -43,7 +43,7 @@ struct LiveSource::Impl {
 Result<std::unique_ptr<LiveSource>> LiveSource::open(Options options, ViewServer& server) {
   auto impl = std::make_unique<Impl>(server);
   // Samples come before there is somebody to ask what they are of.
-  std::unique_lock lock(impl->mutex);
+  const std::lock_guard lock(impl->mutex);
   auto subscriptions_result = bags::Subscriptions::open(
       {.name = "jostle_view",
        .domain = options.domain,
@@ -52,9 +52,8 @@ Result<std::unique_ptr<LiveSource>> LiveSource::open(Options options, ViewServer
        .on_sample = [impl = impl.get()](int topic, std::span<const std::byte> data,
                                         const wire::Origin&) { impl->on_sample(topic, data); },
        .on_warning = std::move(options.on_warning)});
-  if (subscriptions_result) impl->subscriptions = std::move(subscriptions_result).value();
-  lock.unlock();
-  if (!impl->subscriptions) return subscriptions_result.error();
+  if (!subscriptions_result) return subscriptions_result.error();
+  impl->subscriptions = std::move(subscriptions_result).value();
   return std::unique_ptr<LiveSource>(new LiveSource(std::move(impl)));
 }
 

@@ -17,6 +17,7 @@
 #include "services/common/results/results.hpp"
 #include "services/common/results/table.hpp"
 #include "services/studies/experiment/options.hpp"
+#include "services/studies/experiment/runs.hpp"
 #include "services/task/session/composition.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 
@@ -103,10 +104,7 @@ Result<json> perform(const AdaptiveStudy& study, const Case& one, std::optional<
   return record;
 }
 
-bool ended_as(const json& run, Ending ending) { return run.value("ending", "") == planners::to_string(ending); }
-double actions(const json& run) { return run["actions"]; }
 double rollouts(const json& run) { return run["rollouts"]; }
-double planning(const json& run) { return run["planning_seconds"]; }
 
 // Runs of one task at one level with one method.
 struct Cell {
@@ -125,13 +123,6 @@ struct Cell {
 
   common::Share share() const { return common::wilson_interval(successes, static_cast<int>(runs.size())); }
 };
-
-template <class Value>
-common::Mean mean_over(const std::vector<const json*>& runs, Value value) {
-  std::vector<double> values;
-  for (const json* run : runs) values.push_back(value(*run));
-  return common::mean_of(values);
-}
 
 class AdaptiveStudyRunner final : public Study {
  public:
@@ -286,10 +277,7 @@ class AdaptiveStudyRunner final : public Study {
                                                           {"rollouts", mean_over(cell.runs, rollouts)},
                                                           {"planning_seconds", mean_over(cell.runs, planning)},
                                                           {"total_seconds", total(cell)}};
-    for (const auto& [key, mean] : means) {
-      row[key] = common::number_or_null(mean.value);
-      row[std::string(key) + "_half_width"] = common::number_or_null(mean.half_width);
-    }
+    for (const auto& [key, mean] : means) put_mean(row, key, mean);
     return row;
   }
 

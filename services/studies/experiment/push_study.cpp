@@ -15,6 +15,7 @@
 #include "services/common/results/results.hpp"
 #include "services/common/results/table.hpp"
 #include "services/studies/experiment/options.hpp"
+#include "services/studies/experiment/runs.hpp"
 #include "services/task/config/predictor.hpp"
 #include "services/task/session/composition.hpp"
 #include "services/world/in_process/in_process_world.hpp"
@@ -82,8 +83,6 @@ json record_of(const Case& one, const std::string& error) {
   return record;
 }
 
-bool ended_as(const json& run, Ending ending) { return run.value("ending", "") == planners::to_string(ending); }
-
 // Runs with one predictor.
 struct Cell {
   PushStudy::Entry entry;
@@ -108,15 +107,6 @@ struct Cell {
   common::Share share() const { return common::wilson_interval(successes, static_cast<int>(runs.size())); }
 };
 
-template <class Value>
-common::Mean mean_over(const std::vector<const json*>& runs, Value value) {
-  std::vector<double> values;
-  for (const json* run : runs) values.push_back(value(*run));
-  return common::mean_of(values);
-}
-
-double planning(const json& run) { return run["planning_seconds"]; }
-double actions(const json& run) { return run["actions"]; }
 double per_plan(const json& run) { return planning(run) / (run["replans"].get<double>() + 1); }
 
 std::vector<Cell> cells(const std::vector<PushStudy::Entry>& entries, const json& runs) {
@@ -244,10 +234,7 @@ class PushStudyRunner final : public Study {
                                                           {"planning_seconds", mean_over(cell.runs, planning)},
                                                           {"seconds_per_plan", mean_over(cell.in_time, per_plan)},
                                                           {"completion_seconds", completion(cell)}};
-    for (const auto& [key, mean] : means) {
-      row[key] = common::number_or_null(mean.value);
-      row[std::string(key) + "_half_width"] = common::number_or_null(mean.half_width);
-    }
+    for (const auto& [key, mean] : means) put_mean(row, key, mean);
     return row;
   }
 

@@ -1,0 +1,35 @@
+#pragma once
+/// \file
+/// What studies of whole runs read of their records, and say of many.
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "planners/execution/execution.hpp"
+#include "services/common/charts/statistics.hpp"
+#include "services/common/results/results.hpp"
+
+namespace jostle::studies {
+
+inline bool ended_as(const nlohmann::json& run, planners::Ending ending) {
+  return run.value("ending", "") == planners::to_string(ending);
+}
+inline double actions(const nlohmann::json& run) { return run["actions"]; }
+inline double planning(const nlohmann::json& run) { return run["planning_seconds"]; }  ///< s
+
+/// Returns the mean of `value` of each run.
+template <class Value>
+common::Mean mean_over(const std::vector<const nlohmann::json*>& runs, Value value) {
+  std::vector<double> values;
+  for (const nlohmann::json* run : runs) values.push_back(value(*run));
+  return common::mean_of(values);
+}
+
+/// Puts a mean into a row of results, and half its 95 % interval as `key`_half_width.
+inline void put_mean(nlohmann::json& row, const std::string& key, const common::Mean& mean) {
+  row[key] = common::number_or_null(mean.value);
+  row[key + "_half_width"] = common::number_or_null(mean.half_width);
+}
+
+}  // namespace jostle::studies

@@ -44,7 +44,6 @@ struct Settings {
 struct Implementation {
   const char* name;
   std::unique_ptr<Planner> (*make)(Pool& pool, const Settings& settings, OnProgress on_progress);
-  bool ends_at_success = true;  // otherwise at what it takes for the end of a plan
 };
 
 template <PbstoOptions::Update update>
@@ -221,8 +220,10 @@ TEST_P(PlannerContract, NoIterationsGiveTheInitialControlsAndTheirCost) {
   EXPECT_EQ(plan.states.size(), 4u);
 }
 
-TEST_P(PlannerContract, EndsAtTheFirstSuccess) {
-  if (!GetParam().ends_at_success) GTEST_SKIP() << "it rolls every trajectory out to its end";
+// Of planners that end a rollout at its first success; others roll every trajectory out to its end.
+class EarlyEndContract : public PlannerContract {};
+
+TEST_P(EarlyEndContract, EndsAtTheFirstSuccess) {
   bowl.can_succeed = true;
   Problem problem = bowl_problem(1000);
   problem.objective.success_cost = 0.5 * initial_cost();
@@ -385,19 +386,24 @@ const auto kMppi = ::testing::Values(Implementation{"mppi", &sampling<SamplingOp
 const auto kCem = ::testing::Values(Implementation{"cem", &sampling<SamplingOptions::Method::kCem>});
 const auto kIcem = ::testing::Values(Implementation{"icem", &sampling<SamplingOptions::Method::kIcem>});
 
-const auto kByCost = ::testing::Values(Implementation{"by_cost", &robust_sto<0>, false});
-const auto kRobust = ::testing::Values(Implementation{"by_cost", &robust_sto<0>, false},
-                                       Implementation{"robust", &robust_sto<2>, false});
+const auto kByCost = ::testing::Values(Implementation{"by_cost", &robust_sto<0>});
+const auto kRobust =
+    ::testing::Values(Implementation{"by_cost", &robust_sto<0>}, Implementation{"robust", &robust_sto<2>});
 
 INSTANTIATE_TEST_SUITE_P(Pbsto, PlannerContract, kPbsto, kName);
+INSTANTIATE_TEST_SUITE_P(Pbsto, EarlyEndContract, kPbsto, kName);
 INSTANTIATE_TEST_SUITE_P(Pbsto, PlannerOnPhysicsContract, kPbsto, kName);
 INSTANTIATE_TEST_SUITE_P(Predictive, PlannerContract, kPredictive, kName);
+INSTANTIATE_TEST_SUITE_P(Predictive, EarlyEndContract, kPredictive, kName);
 INSTANTIATE_TEST_SUITE_P(Predictive, PlannerOnPhysicsContract, kPredictive, kName);
 INSTANTIATE_TEST_SUITE_P(Mppi, PlannerContract, kMppi, kName);
+INSTANTIATE_TEST_SUITE_P(Mppi, EarlyEndContract, kMppi, kName);
 INSTANTIATE_TEST_SUITE_P(Mppi, PlannerOnPhysicsContract, kMppi, kName);
 INSTANTIATE_TEST_SUITE_P(Cem, PlannerContract, kCem, kName);
+INSTANTIATE_TEST_SUITE_P(Cem, EarlyEndContract, kCem, kName);
 INSTANTIATE_TEST_SUITE_P(Cem, PlannerOnPhysicsContract, kCem, kName);
 INSTANTIATE_TEST_SUITE_P(Icem, PlannerContract, kIcem, kName);
+INSTANTIATE_TEST_SUITE_P(Icem, EarlyEndContract, kIcem, kName);
 INSTANTIATE_TEST_SUITE_P(Icem, PlannerOnPhysicsContract, kIcem, kName);
 INSTANTIATE_TEST_SUITE_P(RobustSto, PlannerContract, kByCost, kName);
 INSTANTIATE_TEST_SUITE_P(RobustSto, PlannerOnPhysicsContract, kRobust, kName);

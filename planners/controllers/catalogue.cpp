@@ -53,6 +53,16 @@ std::unique_ptr<Planner> adaptive_planner(physics_pool::Pool& pool, const Scene&
   return std::make_unique<AdaptivePlanner>(pool, geometry, optimizer, method(options.adaptive), std::move(on_progress));
 }
 
+template <AdaptiveOptions (*method)(AdaptiveOptions)>
+constexpr ControllerKind adaptive_kind(const char* name, const char* purpose) {
+  return {.name = name,
+          .purpose = purpose,
+          .parameters = "experiments/adaptive.yaml",
+          .fits = adapts_in_the_plane,
+          .run = adapt<method>,
+          .planner = adaptive_planner<method>};
+}
+
 // `method` makes one of the five methods of Sec. 4.5 of the same options.
 template <RobustControlOptions (*method)(RobustControlOptions)>
 Result<Outcome> robust(const ControlSetup& setup, const ControllerOptions& options, const OnEvent& on_event,
@@ -93,24 +103,10 @@ constexpr ControllerKind kMpc{.name = "mpc",
                               .parameters = "experiments/pushing.yaml",
                               .fits = pushes_in_the_plane,
                               .run = push};
-constexpr ControllerKind kTampc{.name = "tampc",
-                                .purpose = "task-adaptive control, fast or slow (Alg. 6)",
-                                .parameters = "experiments/adaptive.yaml",
-                                .fits = adapts_in_the_plane,
-                                .run = adapt<as_it_is>,
-                                .planner = adaptive_planner<as_it_is>};
-constexpr ControllerKind kUampc{.name = "uampc",
-                                .purpose = "the same with slow actions only (Sec. 5.5)",
-                                .parameters = "experiments/adaptive.yaml",
-                                .fits = adapts_in_the_plane,
-                                .run = adapt<slow_only>,
-                                .planner = adaptive_planner<slow_only>};
-constexpr ControllerKind kSlowMpc{.name = "slow-mpc",
-                                  .purpose = "one slow plan without a thought of noise (MPC of Sec. 5.5)",
-                                  .parameters = "experiments/adaptive.yaml",
-                                  .fits = adapts_in_the_plane,
-                                  .run = adapt<standard_mpc>,
-                                  .planner = adaptive_planner<standard_mpc>};
+constexpr ControllerKind kTampc = adaptive_kind<as_it_is>("tampc", "task-adaptive control, fast or slow (Alg. 6)");
+constexpr ControllerKind kUampc = adaptive_kind<slow_only>("uampc", "the same with slow actions only (Sec. 5.5)");
+constexpr ControllerKind kSlowMpc =
+    adaptive_kind<standard_mpc>("slow-mpc", "one slow plan without a thought of noise (MPC of Sec. 5.5)");
 
 constexpr ControllerKind kOpenLoop = robust_kind<open_loop>("ol", "a whole plan without looking (OL of Sec. 4.5)");
 constexpr ControllerKind kRobustOpenLoop =

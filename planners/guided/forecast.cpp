@@ -32,7 +32,8 @@ Forecast Forecaster::run(const ForecastProblem& problem, const physics_pool::Sco
                            .facts = {}});
     if (!std::isfinite(sum)) return {};
     forecast.steps = t + 1;
-    const bool may_succeed = t >= problem.min_steps;
+    // A rollout ends early from n_min on; at its end it may be at the goal as well.
+    const bool may_succeed = t >= problem.min_steps || t + 1 == controls.steps();
     if (may_succeed && scorer.at_goal(geometry, after_)) {
       const double cost = sum + scorer.final(geometry, after_);
       if (cost <= problem.objective.success_cost) {

@@ -15,7 +15,7 @@ namespace jostle::planners {
 /// A guess, which ranks and decides nothing.
 struct Forecast {
   double cost = std::numeric_limits<double>::infinity();  ///< as a rollout's; of one that drops something, so far
-  bool succeeds = false;                                  ///< as a rollout's success
+  bool succeeds = false;                                  ///< at the goal, early or at its end, and not too dear
   int lodged = 0;                                         ///< other objects in the hand at the end
   int steps = 0;                                          ///< until its success, or its end
 

@@ -21,7 +21,6 @@ namespace {
 using physics_pool::BatchReply;
 using physics_pool::RolloutBatch;
 
-constexpr std::size_t kInitial = 0;       // the candidate that is the problem's own
 constexpr std::size_t kElites = 6;        // that later generations are drawn around
 constexpr std::size_t kMostJudged = 8;    // per iteration
 constexpr double kDifferent = 0.012;      // m: candidates whose hands are never farther apart are the same
@@ -78,9 +77,13 @@ class Guided {
     if (u_before_.empty()) u_before_.assign(static_cast<std::size_t>(problem.initial.nu), 0.0);
   }
 
-  // One iteration.
+  // One iteration. An initial sequence that coarse physics believes in, as what is left of a good plan, is judged
+  // before anything is drawn: where the engine agrees it is the plan, as in Alg. 1 and 2.
   Result<void> improve() {
     const auto iteration = static_cast<std::uint32_t>(search_.best().iterations);
+    if (iteration == 0 && forecast({.controls = problem_.initial}, forecasters_[0]).succeeds) {
+      if (auto ok = judge({problem_.initial}); !ok || search_.best().at_goal) return ok;
+    }
     stream_ = (problem_.stream + iteration) % physics_pool::kSamplingStreams;
     candidates_.clear();
     const int generations = std::max(guidance_.generations, 1);
@@ -88,7 +91,16 @@ class Guided {
       const int first = guidance_.candidates * g / generations, end = guidance_.candidates * (g + 1) / generations;
       if (auto ok = run_generation(g, first, end); !ok) return ok;
     }
-    return judge(std::min(static_cast<std::size_t>(guidance_.judged) << std::min(iteration, 3u), kMostJudged));
+    auto best_result =
+        best_in_doubt(std::min(static_cast<std::size_t>(guidance_.judged) << std::min(iteration, 3u), kMostJudged));
+    if (!best_result) return best_result.error();
+    std::vector<ControlSequence> chosen;
+    for (const std::size_t i : *best_result) chosen.push_back(candidates_[i].controls);
+    // A plan is never worse than what it began with. Last, for coarse physics has found better ones, it says.
+    if (judged_.empty() && std::ranges::find(chosen, problem_.initial) == chosen.end()) {
+      chosen.push_back(problem_.initial);
+    }
+    return judge(chosen);
   }
 
  private:
@@ -163,7 +175,7 @@ class Guided {
   // A pure function of the indices, of the elites and of what the engine has judged.
   void make(int generation, std::size_t i, const std::vector<std::size_t>& elites, Candidate& candidate) const {
     const CandidateIndex index{.stream = stream_, .number = static_cast<std::uint32_t>(i)};
-    if (i == kInitial) {
+    if (i == 0) {
       candidate.controls = problem_.initial;
     } else if (i == 1) {
       candidate.controls = search_.best().controls;
@@ -212,17 +224,12 @@ class Guided {
     return chosen;
   }
 
-  Result<void> judge(std::size_t most) {
+  // Has the engine roll sequences out as they are, side by side, and keeps the first that is enough, or else the
+  // cheapest.
+  Result<void> judge(const std::vector<ControlSequence>& chosen) {
     std::vector<RolloutBatch> batches;
-    auto best_result = best_in_doubt(most);
-    if (!best_result) return best_result.error();
-    std::vector<std::size_t>& chosen = *best_result;
-    // A plan is never worse than what it began with. Last, for coarse physics has found better ones, it says.
-    if (search_.best().iterations == 0 && std::ranges::find(chosen, kInitial) == chosen.end()) {
-      chosen.push_back(kInitial);
-    }
-    for (const std::size_t i : chosen) {
-      RolloutBatch one = search_.around(candidates_[i].controls);
+    for (const ControlSequence& controls : chosen) {
+      RolloutBatch one = search_.around(controls);
       std::ranges::fill(one.law.sigma, 0.0);
       one.want_all_trajectories = true;
       batches.push_back(std::move(one));
@@ -232,11 +239,11 @@ class Guided {
     if (!replies_result) return replies_result.error();
     for (std::size_t i = 0; i < batches.size(); ++i) {
       const BatchReply& reply = (*replies_result)[i];
-      if (reply.outcomes.empty()) break;  // behind a success
+      if (reply.outcomes.empty()) break;  // behind one that is enough
       const physics_pool::RolloutOutcome& outcome = reply.outcomes.front();
-      const bool success = succeeded(reply);
-      if (success || (winner_of(reply) && outcome.cost < search_.best().cost)) search_.adopt(batches[i], reply);
-      if (success) break;
+      const bool enough = search_.is_enough(reply);
+      if (enough || (winner_of(reply) && outcome.cost < search_.best().cost)) search_.adopt(batches[i], reply);
+      if (enough) break;
       judged_.push_back({.controls = batches[i].nominal,
                          .states = outcome.trajectory.empty() ? Trajectory{problem_.x0} : outcome.trajectory,
                          .step_costs = outcome.step_costs});

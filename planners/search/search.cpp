@@ -73,7 +73,7 @@ Result<std::vector<BatchReply>> Search::run_in_order(std::span<const RolloutBatc
     for (std::size_t i = 0; i < batches.size(); ++i) {
       waiting.emplace_back([&, i] {
         results[i] = pool_.run(batches[i], deadline_, stops[i].get_token());
-        if (!*results[i] || succeeded(**results[i])) stop_from(i + 1);
+        if (!*results[i] || is_enough(**results[i])) stop_from(i + 1);
       });
     }
   }
@@ -84,9 +84,14 @@ Result<std::vector<BatchReply>> Search::run_in_order(std::span<const RolloutBatc
     for (const RolloutOutcome& outcome : replies[i].outcomes) {
       if (outcome.end == End::kDiverged) divergence_ = outcome.reason;
     }
-    if (succeeded(replies[i])) break;
+    if (is_enough(replies[i])) break;
   }
   return replies;
+}
+
+bool Search::is_enough(const BatchReply& reply) const {
+  const RolloutOutcome* winner = winner_of(reply);
+  return winner && winner->at_goal && winner->cost <= pattern_.objective.success_cost;
 }
 
 void Search::adopt(const RolloutBatch& batch, const BatchReply& reply) {
@@ -97,7 +102,7 @@ void Search::adopt(const RolloutBatch& batch, const BatchReply& reply) {
   if (batch.fidelity == physics_pool::Fidelity{}) best_.controls.truncate(static_cast<int>(winner->steps));
   best_.states = winner->trajectory;
   best_.cost = winner->cost;
-  best_.at_goal = winner->at_goal && winner->cost <= pattern_.objective.success_cost;
+  best_.at_goal = is_enough(reply);
 }
 
 Result<void> Search::consider(const ControlSequence& controls) {

@@ -31,10 +31,14 @@ class Search {
   /// Runs a batch and counts its rollouts, also if it fails.
   Result<physics_pool::BatchReply> run(const physics_pool::RolloutBatch& batch);
 
-  /// Runs batches side by side, each in a thread that waits for the pool. Once one has succeeded those behind it are
+  /// Runs batches side by side, each in a thread that waits for the pool. Once one is enough those behind it are
   /// cancelled, since nobody will ask for them, and their replies are empty: what is returned does not depend on who
   /// was faster. Counts the rollouts of all.
   Result<std::vector<physics_pool::BatchReply>> run_in_order(std::span<const physics_pool::RolloutBatch> batches);
+
+  /// Whether the winner of a batch is a plan that needs no improvement: at the goal, and not too dear. One of few steps
+  /// can be that without the early end of a success, which asks for n_min steps before it.
+  bool is_enough(const physics_pool::BatchReply& reply) const;
 
   /// Keeps the winner of a batch, if it has one.
   void adopt(const physics_pool::RolloutBatch& batch, const physics_pool::BatchReply& reply);

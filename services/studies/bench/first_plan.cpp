@@ -115,8 +115,10 @@ Result<std::vector<FirstPlanSide>> measure_first_plans(const FirstPlanOptions& o
   task::Parameters after = before;
   after.guidance.candidates = options.guidance;
   physics_pool::ThreadPool pool(options.workers);
-  std::vector<FirstPlanSide> sides{{.name = "without guidance"}, {.name = "with guidance"}};
-  options.line->expect(2 * static_cast<std::size_t>(options.worlds));
+  std::vector<FirstPlanSide> sides;
+  if (options.before) sides.push_back({.name = "without guidance"});
+  sides.push_back({.name = "with guidance"});
+  options.line->expect(sides.size() * static_cast<std::size_t>(options.worlds));
   for (int i = 0; i < options.worlds; ++i) {
     const std::uint64_t seed = options.first_seed + static_cast<std::uint64_t>(i);
     auto scene_result =
@@ -125,7 +127,7 @@ Result<std::vector<FirstPlanSide>> measure_first_plans(const FirstPlanOptions& o
     auto truth_result = physics_pool::World::compile(*scene_result);
     if (!truth_result) return truth_result.error();
     for (FirstPlanSide& side : sides) {
-      const auto ok = run_in(*scene_result, *truth_result, seed, &side == &sides[0] ? before : after, pool, side, stop);
+      const auto ok = run_in(*scene_result, *truth_result, seed, &side == &sides.back() ? after : before, pool, side, stop);
       if (stop.stop_requested()) return sides;
       if (!ok) return ok.error();
       options.line->step(
@@ -150,7 +152,7 @@ std::string to_text(const std::vector<FirstPlanSide>& sides) {
 
 nlohmann::json to_json(const std::vector<FirstPlanSide>& sides, const FirstPlanOptions& options) {
   nlohmann::json json = to_json(sides.back());
-  json["before"] = to_json(sides.front());
+  if (options.before) json["before"] = to_json(sides.front());
   json["first_seed"] = options.first_seed;
   json["objects"] = options.objects;
   json["table"] = options.table;

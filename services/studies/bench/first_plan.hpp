@@ -22,6 +22,7 @@ struct FirstPlanOptions {
   int workers = 2;                  ///< threads of the pool
   double timeout = 60.0;            ///< s, planning and acting of one run
   int guidance = 600;               ///< candidates of the side with guidance
+  bool before = true;               ///< run the side without guidance, too
   WorkLine* line = nullptr;         ///< never null
 };
 
@@ -39,8 +40,8 @@ struct FirstPlanSide {
   std::vector<TimedPlan> first, replans;  ///< first: one per world, those that failed with the time that they took
 };
 
-/// Runs the controller `or` with the parameters of `jostle run` in every world, both sides in turns: without guidance,
-/// then with it. After a stop request it returns what was measured until then.
+/// Runs the controller `or` with the parameters of `jostle run` in every world, the sides in turns: without guidance, if
+/// asked for, then with it. After a stop request it returns what was measured until then.
 /// Errors   those of the scenes, the pool and the controller
 Result<std::vector<FirstPlanSide>> measure_first_plans(const FirstPlanOptions& options,
                                                        const std::filesystem::path& parameters, std::stop_token stop);
@@ -48,7 +49,7 @@ Result<std::vector<FirstPlanSide>> measure_first_plans(const FirstPlanOptions& o
 std::string to_text(const std::vector<FirstPlanSide>& sides);
 
 /// Returns fields worlds, solved, plan_seconds, replan_seconds, plan_engine_steps and replan_engine_steps (each median,
-/// p90, and all values) of the last side, and the same of the first under `before`.
+/// p90, and all values) of the last side, and the same of the first, if there are two, under `before`.
 nlohmann::json to_json(const std::vector<FirstPlanSide>& sides, const FirstPlanOptions& options);
 
 /// `jostle bench first-plan`: measures, prints, writes. Error kCancelled after a stop request, with what was measured

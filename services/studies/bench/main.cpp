@@ -231,6 +231,7 @@ class FirstPlan final : public Benchmark {
     app.add_option("--timeout", options_.timeout, "Seconds of one run")
         ->capture_default_str()
         ->check(CLI::Range(1.0, 1e6));
+    app.add_flag("--no-before{false}", options_.before, "Leave the side without guidance away");
     app.add_option("--guidance", options_.guidance, "Candidates per iteration of the side with guidance")
         ->capture_default_str()
         ->check(CLI::Range(1, 100'000));

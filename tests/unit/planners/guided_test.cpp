@@ -127,6 +127,20 @@ TEST_F(GuidedTest, PlanIsNeverWorseThanWhatItBeganWith) {
   }
 }
 
+TEST_F(GuidedTest, WhatIsLeftOfAGoodPlanIsThePlanAndCostsOneRollout) {
+  const Plan good = planned(2, 2, problem());
+  ASSERT_GE(good.controls.steps(), 3);
+  Problem again = problem();
+  // Fewer steps than n_min: no rollout of them ends early as a success.
+  again.x0 = good.states[good.states.size() - 3];
+  again.initial = good.controls;
+  while (again.initial.steps() > 2) again.initial.drop_first();
+  const Plan plan = planned(2, 2, again);
+  EXPECT_TRUE(plan.at_goal);
+  EXPECT_EQ(plan.controls, again.initial);
+  EXPECT_EQ(plan.rollouts, 1u);
+}
+
 TEST_F(GuidedTest, AnyNumberOfThreadsGivesTheSamePlanBitForBit) {
   Problem hard = problem();
   hard.objective.success_cost = 1e-3;  // nothing succeeds: every iteration has its part

@@ -22,6 +22,7 @@ using physics_pool::BatchReply;
 using physics_pool::RolloutBatch;
 
 constexpr std::size_t kElites = 6;        // that later generations are drawn around
+constexpr int kMostGenerations = 2;       // times as many as asked for, while none succeeds
 constexpr std::size_t kMostJudged = 8;    // per iteration
 constexpr double kDifferent = 0.012;      // m: candidates whose hands are never farther apart are the same
 constexpr double kAroundElites = 0.6;     // share of a later generation
@@ -86,13 +87,15 @@ class Guided {
     }
     stream_ = (problem_.stream + iteration) % physics_pool::kSamplingStreams;
     candidates_.clear();
-    const int generations = std::max(guidance_.generations, 1);
-    for (int g = 0; g < generations; ++g) {
-      const int first = guidance_.candidates * g / generations, end = guidance_.candidates * (g + 1) / generations;
-      if (auto ok = run_generation(g, first, end); !ok) return ok;
+    // Coarse physics is cheap: while nothing is promised, it goes on before the engine is asked.
+    const int generations = std::max(guidance_.generations, 1), most = kMostGenerations * generations;
+    for (int g = 0; g < most && (g < generations || !promises()); ++g) {
+      const int size = guidance_.candidates * (g % generations + 1) / generations -
+                       guidance_.candidates * (g % generations) / generations;
+      if (auto ok = run_generation(g, size); !ok) return ok;
     }
     auto best_result =
-        best_in_doubt(std::min(static_cast<std::size_t>(guidance_.judged) << std::min(iteration, 3u), kMostJudged));
+        best_in_doubt(std::min(static_cast<std::size_t>(guidance_.judged) << std::min(denials_, 3u), kMostJudged));
     if (!best_result) return best_result.error();
     std::vector<ControlSequence> chosen;
     for (const std::size_t i : *best_result) chosen.push_back(candidates_[i].controls);
@@ -100,15 +103,22 @@ class Guided {
     if (judged_.empty() && std::ranges::find(chosen, problem_.initial) == chosen.end()) {
       chosen.push_back(problem_.initial);
     }
-    return judge(chosen);
+    const bool promised = promises();
+    if (auto ok = judge(chosen); !ok) return ok;
+    if (promised && !search_.best().at_goal) ++denials_;
+    return {};
   }
 
  private:
-  // Draws and forecasts candidates first, …, end - 1.
-  Result<void> run_generation(int generation, int first, int end) {
+  bool promises() const {
+    return std::ranges::any_of(candidates_, [](const Candidate& c) { return c.forecast.succeeds; });
+  }
+
+  // Draws and forecasts so many candidates.
+  Result<void> run_generation(int generation, int size) {
     const std::vector<std::size_t> elites = generation > 0 ? best_that_differ(kElites) : std::vector<std::size_t>{};
     const std::size_t offset = candidates_.size();
-    candidates_.resize(offset + static_cast<std::size_t>(end - first));
+    candidates_.resize(offset + static_cast<std::size_t>(size));
     return in_parallel(offset, candidates_.size(), [&](std::size_t i, Forecaster& forecaster) {
       make(generation, i, elites, candidates_[i]);
       candidates_[i].forecast = forecast(candidates_[i], forecaster);
@@ -181,7 +191,8 @@ class Guided {
       candidate.controls = search_.best().controls;
     } else if (const double way = choice(index, 0); !elites.empty() && way < kAroundElites) {
       const std::size_t elite = elites[i % elites.size()];
-      const double scale = kFullestElite * std::pow(0.5, generation - 1 + 3 * choice(index, 1));
+      const int age = (generation - 1) % std::max(guidance_.generations, 1);
+      const double scale = kFullestElite * std::pow(0.5, age + 3 * choice(index, 1));
       candidate.controls = draw_around(law_, candidates_[elite].controls, scale, index);
     } else if (!judged_.empty() && choice(index, 2) < kFromKnownStates) {
       const Judged& known = judged_[static_cast<std::size_t>(choice(index, 3) * static_cast<double>(judged_.size()))];
@@ -264,6 +275,7 @@ class Guided {
   std::vector<double> u_before_;
   std::uint32_t stream_ = 0;
   std::vector<Candidate> candidates_;  // of this iteration
+  unsigned denials_ = 0;               // iterations in which the engine denied what coarse physics promised
   std::vector<Judged> judged_;         // in this plan, without success
 };
 

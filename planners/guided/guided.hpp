@@ -12,11 +12,11 @@
 namespace jostle::planners {
 
 struct GuidanceOptions {
-  /// Candidates per iteration that coarse physics ranks; 0: no guidance. More find more: a thousand take some 0.2 s of
-  /// a core.
+  /// Candidates per iteration that coarse physics ranks, and up to twice as many while none of them succeeds in it; 0:
+  /// no guidance. More find more: a thousand take some 0.2 s of a core.
   int candidates = 0;
   int generations = 3;  ///< that they come in; all but the first are drawn around the best ones, too
-  int judged = 2;       ///< of them, the engine judges in the first iteration, side by side; more in later ones
+  int judged = 2;       ///< of them, the engine judges in an iteration, side by side; more after each denial
   int threads = 0;      ///< that rank; 0: one per processor. Changes no plan.
 };
 

@@ -85,7 +85,8 @@ constexpr ControllerKind robust_kind(const char* name, const char* purpose) {
           .parameters = "experiments/robust.yaml",
           .fits = grasps_in_the_plane,
           .run = robust<method>,
-          .planner = robust_planner<method>};
+          .planner = robust_planner<method>,
+          .improves_initial = true};
 }
 
 constexpr ControllerKind kOnline{.name = "or",

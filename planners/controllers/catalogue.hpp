@@ -44,6 +44,9 @@ struct ControllerKind {
   std::unique_ptr<Planner> (*planner)(physics_pool::Pool& pool, const physics_pool::Scene& scene,
                                       const physics_pool::TaskGeometry& geometry, const PbstoOptions& optimizer,
                                       const ControllerOptions& options, OnProgress on_progress) = nullptr;
+
+  /// Whether that planner improves Problem::initial; otherwise it makes sequences of its own.
+  bool improves_initial = false;
 };
 
 /// Makes the planner of a controller. Pool, scene and geometry outlive it.

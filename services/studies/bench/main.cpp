@@ -18,6 +18,7 @@
 #include "services/studies/bench/benchmarks.hpp"
 #include "services/studies/bench/chaos.hpp"
 #include "services/studies/bench/cheap_physics.hpp"
+#include "services/studies/bench/coarse_grasp.hpp"
 #include "services/studies/bench/first_plan.hpp"
 #include "services/studies/bench/pool_timeline.hpp"
 #include "services/studies/bench/record.hpp"
@@ -247,6 +248,39 @@ class FirstPlan final : public Benchmark {
   FirstPlanOptions options_;
 };
 
+class CoarseGrasp final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--objects", options_.objects, "Objects beside the target, one row of the table each")
+        ->delimiter(',')
+        ->capture_default_str()
+        ->check(CLI::Range(0, 40));
+    app.add_option("--worlds", options_.worlds, "Worlds for each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    app.add_option("--candidates", options_.candidates, "Candidates in each world")
+        ->capture_default_str()
+        ->check(CLI::Range(2, 100'000));
+    common::add_seed_option(app, "--seed", options_.seed, "Seed of the first world; the next ones follow");
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.parameters = common::data_file("experiments/grasping.yaml");
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_coarse_grasp(options_));
+  }
+
+  const char* unit() const override { return "worlds"; }
+
+ private:
+  CoarseGraspOptions options_;
+};
+
 class PoolTimeline final : public Benchmark {
  public:
   using Benchmark::Benchmark;
@@ -392,6 +426,8 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
       measure_coarse_models);
   add(ratio, "early-stop", "a batch that stops its losers against one that does not", "2 min", kNothing, 5,
       measure_early_stop);
+  add(std::type_identity<CoarseGrasp>(), "coarse-grasp",
+      "coarse physics of a grasp beside the engine: price, ranking, successes found", "15 min", kNothing);
   add(std::type_identity<FirstPlan>(), "first-plan",
       "first plans and re-plans of grasps in fresh worlds, without and with guidance", "an hour", kNothing);
   add(ratio, "hosts", "between two hosts: round trip and throughput, protected against unprotected", "5 min", kDomain,

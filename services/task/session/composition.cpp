@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include "physics_pool/local/simulator.hpp"
+#include "planners/guided/guided_start.hpp"
 
 namespace jostle::task {
 
@@ -14,10 +15,11 @@ Result<Composition> Composition::make(RunParts parts, physics_pool::Pool& pool) 
   auto controller_result = planners::find_controller(parts.controller, parts.belief);
   if (!controller_result) return controller_result.error();
   run.controller_ = *controller_result;
-  if (const int candidates = parts.parameters.guidance.candidates; candidates > 0 && run.controller_->planner) {
+  if (const int candidates = parts.parameters.guidance.candidates;
+      candidates > 0 && run.controller_->planner && !run.controller_->improves_initial) {
     return invalid("planner.guidance",
                    fmt::format("{} candidates for the controller '{}'", candidates, run.controller_->name),
-                   "0 for controllers that have a planner of their own");
+                   "0 for controllers whose planner makes its own sequences");
   }
   auto world_result = pool.load(parts.belief);
   if (!world_result) return world_result.error();
@@ -50,14 +52,21 @@ Result<planners::Outcome> Composition::perform(robot_bridge::Robot& robot, perce
 
 std::unique_ptr<planners::Planner> Composition::make_planner(const planners::OnProgress& on_progress) const {
   const Parameters& parameters = parts_.parameters;
+  std::unique_ptr<planners::GuidedPlanner> guide;
   if (parameters.guidance.candidates > 0) {
-    auto guided_result =
+    auto guide_result =
         planners::GuidedPlanner::make(*pool_, parts_.belief, parameters.planner, parameters.guidance, on_progress);
-    if (guided_result) return std::move(guided_result).value();
-    spdlog::warn("planned without guidance: {}", guided_result.error().message);
+    if (guide_result) {
+      guide = std::move(guide_result).value();
+    } else {
+      spdlog::warn("planned without guidance: {}", guide_result.error().message);
+    }
   }
-  return planners::make_planner(*controller_, *pool_, parts_.belief, geometry(), parameters.planner,
-                                parameters.controller, on_progress);
+  if (guide && !controller_->planner) return guide;
+  auto planner = planners::make_planner(*controller_, *pool_, parts_.belief, geometry(), parameters.planner,
+                                        parameters.controller, on_progress);
+  if (!guide) return planner;
+  return std::make_unique<planners::GuidedStart>(std::move(guide), std::move(planner));
 }
 
 Result<State> Composition::moved_apart(const State& x) const {

@@ -59,8 +59,9 @@ class Composition {
  private:
   Composition() = default;
 
-  // The controller's own planner, Alg. 1, or one that coarse physics guides. A belief that coarse physics cannot show
-  // is planned for without guidance, and the log says why.
+  // The controller's own planner, begun by one that coarse physics guides if it improves what it begins with; or Alg.
+  // 1; or the guided one. A belief that coarse physics cannot show is planned for without guidance, and the log says
+  // why.
   std::unique_ptr<planners::Planner> make_planner(const planners::OnProgress& on_progress) const;
   Result<State> moved_apart(const State& x) const;
 

@@ -40,6 +40,12 @@ Interval median_interval(std::vector<double> values) {
   return {values[outside], values[n - 1 - outside]};
 }
 
+double sign_test(int a, int b) {
+  double tail = 0.0;
+  for (int i = 0; i <= std::min(a, b); ++i) tail += binomial(a + b, i);
+  return std::min(2 * tail, 1.0);
+}
+
 Mean mean_of(const std::vector<double>& values) {
   if (values.empty()) return {};
   const auto n = static_cast<double>(values.size());

@@ -44,6 +44,10 @@ struct Share {
 };
 Share wilson_interval(int successes, int runs);
 
+/// Returns how likely a fair coin falls at least as unevenly as `a` heads and `b` tails: the two-sided sign test of
+/// pairs that differ (exact McNemar); 1 without pairs.
+double sign_test(int a, int b);
+
 /// Writes a number with so many digits after the point, or its first digit if none of these is another than 0; "-" if
 /// there is no number.
 std::string number_text(double value, int digits);

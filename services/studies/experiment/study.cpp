@@ -12,6 +12,7 @@
 #include "services/studies/experiment/grasping_study.hpp"
 #include "services/studies/experiment/prediction_study.hpp"
 #include "services/studies/experiment/push_study.hpp"
+#include "services/studies/experiment/robust_study.hpp"
 #include "services/studies/experiment/timing_study.hpp"
 
 namespace jostle::studies {
@@ -43,6 +44,7 @@ Result<std::unique_ptr<Study>> load_study(const std::string& name) {
                                    {"grasping", &read_grasping_study},
                                    {"prediction", &read_prediction_study},
                                    {"push", &read_push_study},
+                                   {"robust", &read_robust_study},
                                    {"timing", &read_timing_study}});
     if (!root["study"]) {
       return Error{Code::kInvalidArgument, fmt::format("{}: study: missing, wanted a kind of study: these are "

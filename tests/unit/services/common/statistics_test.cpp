@@ -77,6 +77,14 @@ TEST(MeanOf, HasNoIntervalOfOneValue) {
   EXPECT_TRUE(std::isnan(mean_of({4.0}).half_width));
 }
 
+TEST(SignTest, IsTheExactOneOfAFairCoin) {
+  EXPECT_DOUBLE_EQ(sign_test(0, 0), 1.0);
+  EXPECT_DOUBLE_EQ(sign_test(3, 3), 1.0);
+  EXPECT_NEAR(sign_test(5, 0), 2.0 / 32, 1e-12);
+  EXPECT_NEAR(sign_test(1, 7), 2.0 * (1 + 8) / 256, 1e-12);
+  EXPECT_DOUBLE_EQ(sign_test(1, 7), sign_test(7, 1));
+}
+
 TEST(ToText, ShowsNoNumberWhereThereIsNone) {
   EXPECT_EQ(to_text(mean_of({1.0, 2.0, 3.0}), 1), "2.0 ± 1.1");
   EXPECT_EQ(to_text(mean_of({4.0}), 2), "4.00");

@@ -12,6 +12,7 @@
 #include "services/studies/experiment/adaptive_study.hpp"
 #include "services/studies/experiment/grasping_study.hpp"
 #include "services/studies/experiment/push_study.hpp"
+#include "services/studies/experiment/robust_study.hpp"
 #include "services/studies/experiment/study.hpp"
 #include "tests/support/studies.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -378,6 +379,56 @@ TEST_F(AdaptiveStudyRun, TakesOtherTasksMethodsLevelsAndParameters) {
   EXPECT_EQ(result["runs"][0]["method"], "uampc");
   EXPECT_EQ(result["runs"][0]["actions"], 1);
   EXPECT_THROW(set_options(*sut, {"--tasks", "narrow"}), CLI::ParseError);
+}
+
+class RobustStudyRun : public StudyRun {
+ protected:
+  const Loaded sut =
+      study(&read_robust_study,
+            "step_duration: 0.5\n"
+            "planner: {rollouts: 2, freeze: true, guidance: 60}\n"
+            "robust: {starts: 2, worlds: 1, horizon: 4, iterations: 1, mpc_iterations: 1, max_actions: 2}\n",
+            R"(
+title: tiny and robust
+parameters: parameters.yaml
+methods: [ol, rol, ocl]
+seeds: {first: 1, last: 2}
+world: {least_mass: 0.4, most_mass: 0.9, least_friction: 0.1, most_friction: 0.5, size: 0.01, start_position: 0.01,
+        start_rotation: 0.01}
+thesis: {ol: least}
+)");
+};
+
+TEST_F(RobustStudyRun, PairsMethodsInWorldsThatNoneKnows) {
+  const StudyReport report = finished(*sut).report;
+  const json& result = report.json;
+  ASSERT_EQ(result["rows"].size(), 3u);
+  ASSERT_EQ(result["runs"].size(), 6u);
+  ASSERT_EQ(result["pairs"].size(), 2u);
+  for (const json& row : result["rows"]) {
+    EXPECT_EQ(row["runs"], 2);
+    expect_share(row);
+    EXPECT_EQ(row["expected"].is_null(), row["method"] == "ol");
+    if (row["method"] != "ocl") EXPECT_EQ(row["open_loop_share"], 1.0);
+  }
+  for (const json& run : result["runs"]) {
+    EXPECT_GT(run["actions"], 0);
+    EXPECT_GE(run["execution_seconds"].get<double>(), 0.5 * run["actions"].get<double>() - 1e-9);
+  }
+  EXPECT_EQ(result["pairs"][0]["method"], "ocl");
+  expect_narrow(report.table);
+  EXPECT_EQ(sut->figure(result).size(), 4u);
+}
+
+TEST_F(RobustStudyRun, DecidesTheSameForAnyNumberOfJobs) {
+  const auto decided = [&](const char* jobs) {
+    set_options(*sut, {"--methods", "ocl,cc", "--seeds", "1", "--jobs", jobs});
+    json runs = finished(*sut).report.json["runs"];
+    return without_times(std::move(runs));
+  };
+  const json one = decided("1");
+  EXPECT_EQ(decided("2"), one);
+  EXPECT_EQ(one[0]["method"], "ocl");
 }
 
 class TimedOutPushRun : public StudyRun {

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "services/common/process/command_line.hpp"
@@ -87,6 +88,10 @@ int main(int argc, char** argv) {
         return fail(
             {Code::kUnavailable, fmt::format("{}: not ready within {:g} s: {}", arm_options.host, patience, trouble)});
       if (!common::pause_until(std::chrono::steady_clock::now() + 50ms, signal.token())) return common::kExitOk;
+    }
+    if (const auto off = arm.calibration()) {
+      spdlog::info("its calibration puts the hand up to {:.1f} mm and {:.2f} degrees from where it is taken to be",
+                   1e3 * off->distance, off->angle * 180 / std::numbers::pi);
     }
     spdlog::info("UR5 at {} ready on domain {}", arm_options.host, participant_result->domain());
     RobotServer server(*participant_result, body);

@@ -112,12 +112,12 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST_F(ArmCommands, ThatAreLateStopTheMovingArmWithin200Milliseconds) {
-  silence = "0.07";  // as it is unless told otherwise
+  silence = "0.06";  // as it is unless told otherwise
   ASSERT_NO_FATAL_FAILURE(begin_moving());
   repeats = {};
   const double last = onlooker->next().time;
   EXPECT_LT(time_to_stand(last), 0.2) << bridge->err();
-  EXPECT_THAT(error(), HasSubstr("was not heard for 70 ms"));
+  EXPECT_THAT(error(), HasSubstr("was not heard for 60 ms"));
   expect_to_stand();  // what comes late is not obeyed
 }
 

@@ -64,7 +64,7 @@ class ArmParts_Coordinators : public ArmParts, public ::testing::WithParamInterf
 
 // Whoever commands the bridge is silent.
 TEST_P(ArmParts_Coordinators, DeathStopsTheArmWithin200Milliseconds) {
-  silence = "0.07";  // as it is unless told otherwise
+  silence = "0.06";  // as it is unless told otherwise
   start_moving();
   coordinator->signal(GetParam());
   const double dead = onlooker->next().time;

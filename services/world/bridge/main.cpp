@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
   robot_bridge::ur::PlanarArmOptions arm_options;
   robot_bridge::robotiq::Client::Options gripper_options;
   std::string gripper = "robotiq";
-  double patience = 30.0, silence = 0.07;
+  double patience = 30.0, silence = 0.06;
   std::string scene_file;
   auto* ur5 = app.add_subcommand("ur5", "A UR5 or UR5e, whose hand moves level above a surface");
   ur5->add_option("--host", arm_options.host, "The controller's address or name")->capture_default_str();

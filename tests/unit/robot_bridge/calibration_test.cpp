@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <boost/asio/io_context.hpp>
+#include <cmath>
 #include <thread>
 
 #include "robot_bridge/ur_sim/script_server.hpp"

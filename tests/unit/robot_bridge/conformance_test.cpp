@@ -4,11 +4,14 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <atomic>
 #include <bit>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <functional>
+#include <memory>
+#include <string>
 #include <thread>
 
 #include "robot_bridge/robotiq/client.hpp"
@@ -228,7 +231,7 @@ class Prompter {
   /// What the client said that is not on the page; once it is done, or has gone.
   std::string trouble() {
     thread_.request_stop();
-    thread_.join();
+    if (thread_.joinable()) thread_.join();
     return trouble_;
   }
 
@@ -240,7 +243,7 @@ class Prompter {
       poll(nullptr, 0, 1);
       return !stop.stop_requested();
     };
-    while (acceptor_.accept(socket, code)) {
+    for (acceptor_.accept(socket, code); code; acceptor_.accept(socket, code)) {
       if (!waits()) return;
     }
     socket.non_blocking(true, code);
@@ -276,7 +279,8 @@ class Prompter {
   const Talk talk_;
   const std::size_t again_;
   boost::asio::io_context context_;
-  boost::asio::ip::tcp::acceptor acceptor_{context_, {boost::asio::ip::address_v4::loopback(), 0}};
+  boost::asio::ip::tcp::acceptor acceptor_{context_,
+                                           boost::asio::ip::tcp::endpoint(boost::asio::ip::address_v4::loopback(), 0)};
   std::atomic<bool> done_ = false;
   std::string trouble_;
   std::jthread thread_;  // last: it uses all of the above
@@ -363,7 +367,7 @@ TEST_P(RtdeConformance, OfTheClient) {
   EXPECT_EQ(sut->version(), (ur::rtde::ControllerVersion{3, 15, 8, 106339}));
   const auto state = sut->next(Clock::now() + kPatience);
   ASSERT_TRUE(state) << state.error().message;
-  EXPECT_EQ(state->timestamp, 60.008);
+  EXPECT_EQ(state->timestamp, 60.0 + 0.008);
   EXPECT_EQ(state->q, (ur::Joints{0, -1.5, 1.5, -1.5, -1.5, 0}));
   EXPECT_EQ(state->qd, ur::Joints{});
   EXPECT_EQ(state->q_target, state->q);

@@ -17,8 +17,9 @@ using ur::Joints;
 /// Where the arm stands, and how it holds its hand.
 struct Mounting {
   /// X_WB: the arm's base in the world, whose origin is on the surface. By default beside a table of 0.6 m, at its near
-  /// end, in the middle.
-  Eigen::Isometry3d base{Eigen::Translation3d(-0.72, 0.0, 0.0)};
+  /// end, in the middle: the hand may be 0.33 m before it, where the folded forearm passes the shoulder, to 1.01 m,
+  /// where the elbow is straight, so that plans have 0.1 m to back off before the table, and fingers reach its far end.
+  Eigen::Isometry3d base{Eigen::Translation3d(-0.78, 0.0, 0.0)};
   /// X_TG: frame G of the hand in the flange: x along the tool, 107 mm ahead; z up.
   Eigen::Isometry3d hand{Eigen::Translation3d(0.0, 0.0, 0.107) * Eigen::Quaterniond(0.5, -0.5, -0.5, -0.5)};
   double height = 0.055;  ///< of G above the surface, m: the wrist's lower end just clears it

@@ -54,11 +54,6 @@ std::string ArmHand::trouble() {
   return gripper_ && !fingers_.is_ready ? fingers_.trouble : "";
 }
 
-const ArmState& ArmHand::arm_state() {
-  refresh();
-  return report_.state;
-}
-
 Result<RobotReading> ArmHand::read(std::stop_token stop) {
   if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped on request"};
   refresh();

@@ -31,8 +31,8 @@ class ArmHand final : public Robot {
 
   /// Says what keeps it from moving; "" if nothing does.
   std::string trouble();
-  /// Returns the newest sample of the arm, which may be old: see ArmState::received.
-  const ArmState& arm_state();
+  /// Returns the arm's sample that the last reading was made of, which may be old: see ArmState::received.
+  const ArmState& arm_state() const { return report_.state; }
 
  private:
   void refresh();

@@ -58,7 +58,12 @@ std::vector<PartShape> arm_shapes(const Joints& q) {
   add(Part::kBase, Isometry3d::Identity(), {{0, 0, 0}, {0, 0, 0}, 0.075});
   add(Part::kShoulder, shoulder, along_z(-0.065, 0.068, 0.06));
   add(Part::kUpperArm, upper, {{0, 0, 0.136}, {-0.425, 0, 0.136}, 0.06});
-  add(Part::kForearm, forearm, {{0, 0, 0.0165}, {-0.392, 0, 0.0165}, 0.058});
+  // It tapers from 58 to 45 mm: four pieces, each as thick as its thicker end.
+  constexpr int kPieces = 4;
+  for (int i = 0; i < kPieces; ++i) {
+    const double begin = -0.392 * i / kPieces, end = -0.392 * (i + 1) / kPieces;
+    add(Part::kForearm, forearm, {{begin, 0, 0.0165}, {end, 0, 0.0165}, 0.058 - 0.013 * i / kPieces});
+  }
   add(Part::kWrist1, wrist1, along_z(-0.046, 0.040, 0.04));
   add(Part::kWrist1, wrist1, along_y(-0.048, 0.057, 0.04));
   add(Part::kWrist2, wrist2, along_z(-0.046, 0.038, 0.04));

@@ -16,7 +16,7 @@ constexpr double kStraight = 1e-7;   // rad, an angle that an arc cosine cannot 
 constexpr double kOverreach = 1e-9;  // how far beyond 1 rounding may take a cosine
 
 Isometry3d link(const DhRow& row, double q) {
-  return Eigen::Translation3d(0, 0, row.d) * Eigen::AngleAxisd(q, Vector3d::UnitZ()) *
+  return Eigen::Translation3d(0, 0, row.d) * Eigen::AngleAxisd(q + row.theta, Vector3d::UnitZ()) *
          Eigen::Translation3d(row.a, 0, 0) * Eigen::AngleAxisd(row.alpha, Vector3d::UnitX());
 }
 

@@ -12,14 +12,15 @@ namespace jostle::robot_bridge::ur {
 /// Joint angles from base to wrist 3, rad.
 using Joints = std::array<double, 6>;
 
-/// A row of standard Denavit-Hartenberg parameters: turn about z by q, move along z by d, along x by a, turn about x
-/// by alpha.
+/// A row of standard Denavit-Hartenberg parameters: turn about z by q + theta, move along z by d, along x by a, turn
+/// about x by alpha.
 struct DhRow {
   double a = 0.0, d = 0.0, alpha = 0.0;  ///< m, m, rad
+  double theta = 0.0;                    ///< rad; 0 of arms as drawn
 };
 
 /// The geometry of an arm whose shoulder and elbow axes are parallel, and whose wrist has right angles: what all arms
-/// of the family have as drawn. A calibrated arm differs by tenths of a millimetre, and then has no closed form.
+/// of the family have as drawn. A calibrated arm differs a little, and then has no closed form (calibration.hpp).
 struct Dh {
   std::array<DhRow, 6> rows;
 

@@ -63,6 +63,11 @@ std::string PlanarArm::trouble() const {
   return trouble_;
 }
 
+std::optional<CalibrationError> PlanarArm::calibration() const {
+  const std::lock_guard lock(mutex_);
+  return calibration_;
+}
+
 void PlanarArm::say(const std::string& trouble) {
   const std::lock_guard lock(mutex_);
   trouble_ = trouble;
@@ -187,9 +192,26 @@ void PlanarArm::tend(std::stop_token stop) {
       if (!trouble().empty() && !report.failed) say("");
     } else if (report.is_connected) {
       if (auto ok = get_ready(report.state, stop); !ok) say(ok.error().message);
+    } else {
+      const std::lock_guard lock(mutex_);
+      calibration_.reset();  // who comes next may be another arm
     }
     pause(kTend, stop);
   }
+}
+
+// Before our program is on the controller, without which the arm is not ready.
+Result<void> PlanarArm::look_at_calibration() {
+  if (calibration()) return {};
+  const auto calibrated_result = read_calibration(options_.host, options_.script_port, Clock::now() + kConnect);
+  if (!calibrated_result) {
+    return Error{calibrated_result.error().code, "the arm's calibration: " + calibrated_result.error().message};
+  }
+  const auto error_result = check_calibration(*calibrated_result, options_.mounting);
+  if (!error_result) return error_result.error();
+  const std::lock_guard lock(mutex_);
+  calibration_ = *error_result;
+  return {};
 }
 
 Result<void> PlanarArm::get_ready(const ArmState& state, const std::stop_token& stop) {
@@ -234,6 +256,7 @@ Result<void> PlanarArm::get_ready(const ArmState& state, const std::stop_token& 
     default:
       return refusal(fmt::format("robot mode {}", name_of(state.robot_mode)));
   }
+  if (auto ok = look_at_calibration(); !ok) return ok;
   // The registers keep what they were told: nothing runs before they have said for a while that the arm stands still.
   if (held_ < kHeldEnough) return {};
   if (auto ok = upload(options_.host, options_.script_port, control_program(cycle_, 1.0 / options_.watchdog),

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -13,6 +14,7 @@
 #include "idl/types/result.hpp"
 #include "robot_bridge/planar/arm_in_plane.hpp"
 #include "robot_bridge/safety/mailbox.hpp"
+#include "robot_bridge/ur/calibration.hpp"
 #include "robot_bridge/ur/dashboard.hpp"
 #include "robot_bridge/ur/primary.hpp"
 #include "robot_bridge/ur/rtde_client.hpp"
@@ -72,6 +74,10 @@ class PlanarArm {
   /// Says why the arm is not ready, or why the last motion failed; "" if all is well. Any thread.
   std::string trouble() const;
 
+  /// Returns how far the connected arm is from the arm as drawn; nothing before its controller told. An arm that is too
+  /// far off does not get ready. Any thread.
+  std::optional<CalibrationError> calibration() const;
+
  private:
   struct Order {
     std::uint64_t number = 0;  // 0: none yet
@@ -89,6 +95,7 @@ class PlanarArm {
   // The other thread's.
   void tend(std::stop_token stop);
   Result<void> get_ready(const ArmState& state, const std::stop_token& stop);
+  Result<void> look_at_calibration();
 
   void say(const std::string& trouble);
 
@@ -98,8 +105,9 @@ class PlanarArm {
   Report newest_;            // of who calls report()
   std::uint64_t asked_ = 0;  // motions
 
-  mutable std::mutex mutex_;  // guards trouble_; not for cycles in which all is well
+  mutable std::mutex mutex_;  // guards the two below; not for cycles in which all is well
   std::string trouble_;
+  std::optional<CalibrationError> calibration_;
 
   // Of the control thread.
   planar::ArmInPlane in_plane_;

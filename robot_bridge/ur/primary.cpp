@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace jostle::robot_bridge::ur::primary {
@@ -60,7 +61,7 @@ Bytes joints_part(const State& state) {
 Bytes kinematics_part(const Dh& dh) {
   BigEndianWriter out;
   for (std::size_t j = 0; j < dh.rows.size(); ++j) out.put(std::uint32_t{0});  // checksums
-  for (std::size_t j = 0; j < dh.rows.size(); ++j) out.put(0.0);               // theta
+  for (const DhRow& row : dh.rows) out.put(row.theta);
   for (const DhRow& row : dh.rows) out.put(row.a);
   for (const DhRow& row : dh.rows) out.put(row.d);
   for (const DhRow& row : dh.rows) out.put(row.alpha);
@@ -134,7 +135,7 @@ Result<std::optional<Dh>> read_kinematics(const Packet& packet) {
     left = left.subspan(length);
     if (kind != kKinematicsPart) continue;
     (void)part.get_array<std::uint32_t, 6>();
-    (void)part.get_array<double, 6>();
+    const auto theta = part.get_array<double, 6>();
     const auto a = part.get_array<double, 6>(), d = part.get_array<double, 6>(), alpha = part.get_array<double, 6>();
     const auto status = part.get<std::uint32_t>();
     if (!part.ok()) {
@@ -143,7 +144,14 @@ Result<std::optional<Dh>> read_kinematics(const Packet& packet) {
     }
     if (status != 2) continue;  // not valid
     Dh dh;
-    for (std::size_t j = 0; j < dh.rows.size(); ++j) dh.rows[j] = {.a = a[j], .d = d[j], .alpha = alpha[j]};
+    for (std::size_t j = 0; j < dh.rows.size(); ++j) {
+      dh.rows[j] = {.a = a[j], .d = d[j], .alpha = alpha[j], .theta = theta[j]};
+      for (const double value : {a[j], d[j], alpha[j], theta[j]}) {
+        if (std::isfinite(value)) continue;
+        return Error{Code::kInvalidArgument,
+                     fmt::format("state packet: kinematics of joint {}: got {}, wanted finite numbers", j, value)};
+      }
+    }
     return std::optional(dh);
   }
   return std::optional<Dh>();

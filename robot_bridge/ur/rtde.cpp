@@ -249,18 +249,20 @@ std::optional<std::size_t> Recipe::offset(std::string_view name) const {
   return {};
 }
 
-Packet pack(const Recipe& recipe, const std::vector<Value>& values) {
+Packet pack(const Recipe& recipe, const std::vector<Value>& values, Version version) {
   BigEndianWriter out;
-  out.put(recipe.id);
+  if (version == Version::k2) out.put(recipe.id);
   for (const Value& value : values) std::visit([&](const auto& v) { out.put(v); }, value);
   return {.type = PacketType::kData, .payload = out.take()};
 }
 
-Result<std::vector<Value>> unpack(const Recipe& recipe, const Packet& packet) {
+Result<std::vector<Value>> unpack(const Recipe& recipe, const Packet& packet, Version version) {
   BigEndianReader in(packet.payload);
-  const auto id = in.get<std::uint8_t>();
-  if (id != recipe.id) return invalid("rtde U", fmt::format("recipe {}", id), std::to_string(recipe.id));
-  if (in.left() != recipe.size()) return wrong(packet, std::to_string(1 + recipe.size()));
+  if (version == Version::k2) {
+    const auto id = in.get<std::uint8_t>();
+    if (id != recipe.id) return invalid("rtde U", fmt::format("recipe {}", id), std::to_string(recipe.id));
+  }
+  if (in.left() != recipe.size()) return wrong(packet, fmt::format("a recipe of {} bytes", recipe.size()));
   std::vector<Value> values;
   for (const FieldType type : recipe.types) values.push_back(read_value(type, in));
   return values;
@@ -272,8 +274,10 @@ Packet protocol_request(std::uint16_t version) {
 
 Packet version_request() { return {.type = PacketType::kControllerVersion, .payload = {}}; }
 
-Packet outputs_request(double frequency, const std::vector<std::string>& names) {
-  return with_text(PacketType::kOutputs, names, BigEndianWriter().put(frequency));
+Packet outputs_request(double frequency, const std::vector<std::string>& names, Version version) {
+  BigEndianWriter before;
+  if (version == Version::k2) before.put(frequency);
+  return with_text(PacketType::kOutputs, names, std::move(before));
 }
 
 Packet inputs_request(const std::vector<std::string>& names) { return with_text(PacketType::kInputs, names); }
@@ -292,13 +296,19 @@ Packet version_reply(const ControllerVersion& version) {
   return {.type = PacketType::kControllerVersion, .payload = out.take()};
 }
 
-Packet recipe_reply(PacketType of, const RecipeReply& reply) {
-  return with_text(of, reply.types, BigEndianWriter().put(reply.id));
+Packet recipe_reply(PacketType of, const RecipeReply& reply, Version version) {
+  BigEndianWriter before;
+  if (version == Version::k2) before.put(reply.id);
+  return with_text(of, reply.types, std::move(before));
 }
 
-Packet text_packet(const Text& text) {
+Packet text_packet(const Text& text, Version version) {
   constexpr std::size_t kLongest = 255;
   BigEndianWriter out;
+  if (version == Version::k1) {
+    out.put(static_cast<std::uint8_t>(text.level)).put(std::string_view(text.text).substr(0, kLongest));
+    return {.type = PacketType::kText, .payload = out.take()};
+  }
   for (const std::string& part : {text.text, text.source}) {
     const std::string_view shown = std::string_view(part).substr(0, kLongest);
     out.put(static_cast<std::uint8_t>(shown.size())).put(shown);
@@ -314,8 +324,9 @@ Result<std::uint16_t> read_protocol_request(const Packet& packet) {
   return version;
 }
 
-Result<OutputsRequest> read_outputs_request(const Packet& packet) {
+Result<OutputsRequest> read_outputs_request(const Packet& packet, Version version) {
   BigEndianReader in(packet.payload);
+  if (version == Version::k1) return OutputsRequest{.frequency = kRateOfVersion1, .names = split(in.get_rest())};
   OutputsRequest request{.frequency = in.get<double>(), .names = split(in.get_rest())};
   if (!in.ok()) return wrong(packet, "a frequency of 8 bytes, then names");
   if (!(request.frequency > 0 && request.frequency <= 1000)) {  // not NaN
@@ -346,21 +357,34 @@ Result<ControllerVersion> read_version(const Packet& packet) {
   return version;
 }
 
-Result<RecipeReply> read_recipe_reply(const Packet& packet) {
+Result<RecipeReply> read_recipe_reply(const Packet& packet, Version version) {
   BigEndianReader in(packet.payload);
+  if (version == Version::k1) {
+    RecipeReply reply{.id = 0, .types = split(in.get_rest())};
+    const auto is_type = [](const std::string& name) { return parse_field_type(name).has_value(); };
+    if (!reply.types.empty() && std::ranges::all_of(reply.types, is_type)) reply.id = 1;
+    return reply;
+  }
   RecipeReply reply{.id = in.get<std::uint8_t>(), .types = split(in.get_rest())};
   if (!in.ok()) return wrong(packet, "a recipe id of 1 byte, then types");
   return reply;
 }
 
-Result<Text> read_text(const Packet& packet) {
+Result<Text> read_text(const Packet& packet, Version version) {
   BigEndianReader in(packet.payload);
   Text text;
-  text.text = in.get_text(in.get<std::uint8_t>());
-  text.source = in.get_text(in.get<std::uint8_t>());
-  const auto level = in.get<std::uint8_t>();
+  std::uint8_t level = 0;
+  if (version == Version::k1) {
+    level = in.get<std::uint8_t>();
+    text.text = in.get_rest();
+  } else {
+    text.text = in.get_text(in.get<std::uint8_t>());
+    text.source = in.get_text(in.get<std::uint8_t>());
+    level = in.get<std::uint8_t>();
+  }
   if (!in.done() || level > static_cast<std::uint8_t>(Text::Level::kInfo)) {
-    return wrong(packet, "a text and a source, each behind its length, and a level of 0 to 3");
+    return wrong(packet, version == Version::k1 ? "a level of 0 to 3, and a text"
+                                                : "a text and a source, each behind its length, and a level of 0 to 3");
   }
   text.level = static_cast<Text::Level>(level);
   return text;

@@ -19,6 +19,12 @@ namespace jostle::robot_bridge::ur::rtde {
 
 inline constexpr std::uint16_t kPort = 30004;
 
+/// The two versions of the protocol. A connection is in the first until both sides have agreed on the second: there
+/// recipes have no number, so that there is one of each direction; outputs come as often as they may; a text has no
+/// source.
+enum class Version : std::uint16_t { k1 = 1, k2 = 2 };
+inline constexpr double kRateOfVersion1 = 125.0;  ///< samples/s
+
 enum class PacketType : std::uint8_t {
   kProtocolVersion = 'V',
   kControllerVersion = 'v',
@@ -87,7 +93,7 @@ std::optional<FieldType> input_field(std::string_view name);
 
 /// A Recipe is the list of fields that a data packet carries, one after the other.
 struct Recipe {
-  std::uint8_t id = 0;  ///< 0: none, refused
+  std::uint8_t id = 0;  ///< 0: none, refused; of version 1, which has none: 1
   std::vector<std::string> names;
   std::vector<FieldType> types;
 
@@ -97,12 +103,12 @@ struct Recipe {
 };
 
 /// Returns the data packet of a recipe. `values`: one per field, of its type.
-Packet pack(const Recipe& recipe, const std::vector<Value>& values);
+Packet pack(const Recipe& recipe, const std::vector<Value>& values, Version version = Version::k2);
 /// Returns the values of a data packet.
 /// Error kInvalidArgument naming the id or the size that do not fit the recipe.
-Result<std::vector<Value>> unpack(const Recipe& recipe, const Packet& packet);
+Result<std::vector<Value>> unpack(const Recipe& recipe, const Packet& packet, Version version = Version::k2);
 
-/// A text that either side sends.
+/// A text that either side sends. In version 1 without its source.
 struct Text {
   enum class Level : std::uint8_t { kException = 0, kError = 1, kWarning = 2, kInfo = 3 };
   Level level = Level::kInfo;
@@ -117,7 +123,8 @@ struct ControllerVersion {
   bool operator==(const ControllerVersion&) const = default;
 };
 
-/// What a controller answers to a list of fields: types, or NOT_FOUND and IN_USE, with which the recipe is refused.
+/// What a controller answers to a list of fields: types, or NOT_FOUND and IN_USE, with which the recipe is refused: its
+/// id is 0 then. In version 1 the types alone say so; an id is made of them.
 struct RecipeReply {
   std::uint8_t id = 0;
   std::vector<std::string> types;
@@ -128,29 +135,30 @@ struct RecipeReply {
 /// Client to controller.
 Packet protocol_request(std::uint16_t version);
 Packet version_request();
-Packet outputs_request(double frequency, const std::vector<std::string>& names);  ///< frequency: 1/s
+/// frequency: 1/s; version 1 does not say it.
+Packet outputs_request(double frequency, const std::vector<std::string>& names, Version version = Version::k2);
 Packet inputs_request(const std::vector<std::string>& names);
 Packet start_request();
 Packet pause_request();
 /// Controller to client.
 Packet accepted_reply(PacketType of, bool accepted);  ///< of V, S and P
 Packet version_reply(const ControllerVersion& version);
-Packet recipe_reply(PacketType of, const RecipeReply& reply);  ///< of O and I
+Packet recipe_reply(PacketType of, const RecipeReply& reply, Version version = Version::k2);  ///< of O and I
 /// Either way.
-Packet text_packet(const Text& text);
+Packet text_packet(const Text& text, Version version = Version::k2);
 
-/// Readers of the same, protocol version 2. Errors kInvalidArgument: "rtde V: got 3 bytes, wanted 2".
+/// Readers of the same. Errors kInvalidArgument: "rtde V: got 3 bytes, wanted 2".
 Result<std::uint16_t> read_protocol_request(const Packet& packet);
 struct OutputsRequest {
-  double frequency = 0.0;
+  double frequency = 0.0;  ///< 1/s
   std::vector<std::string> names;
 };
-Result<OutputsRequest> read_outputs_request(const Packet& packet);
+Result<OutputsRequest> read_outputs_request(const Packet& packet, Version version = Version::k2);
 Result<std::vector<std::string>> read_inputs_request(const Packet& packet);
 Result<bool> read_accepted(const Packet& packet);
 Result<ControllerVersion> read_version(const Packet& packet);
-Result<RecipeReply> read_recipe_reply(const Packet& packet);
-Result<Text> read_text(const Packet& packet);
+Result<RecipeReply> read_recipe_reply(const Packet& packet, Version version = Version::k2);
+Result<Text> read_text(const Packet& packet, Version version = Version::k2);
 
 /// Makes a client's recipe of a reply to these names.
 /// Error kInvalidArgument naming every field that is not known, or in use by another client.

@@ -63,7 +63,7 @@ Result<Packet> RtdeClient::answer(const Packet& request, TimePoint deadline) {
       Packet packet = std::move(**packet_result);
       if (packet.type == request.type) return packet;
       if (packet.type != PacketType::kText) continue;  // samples may come in between
-      const auto text_result = rtde::read_text(packet);
+      const auto text_result = rtde::read_text(packet, protocol_);
       if (text_result && text_result->level <= rtde::Text::Level::kError) {
         return Error{Code::kInvalidArgument, text_result->text};
       }
@@ -75,41 +75,51 @@ Result<Packet> RtdeClient::answer(const Packet& request, TimePoint deadline) {
 }
 
 Result<void> RtdeClient::agree(double frequency, TimePoint deadline) {
-  const auto accepted = [&](const Packet& request, const char* what) -> Result<void> {
+  const auto accepted = [&](const Packet& request) -> Result<bool> {
     auto packet_result = answer(request, deadline);
     if (!packet_result) return packet_result.error();
-    const auto accepted_result = rtde::read_accepted(*packet_result);
-    if (!accepted_result) return accepted_result.error();
-    if (!*accepted_result) return Error{Code::kInvalidArgument, fmt::format("the controller refused {}", what)};
-    return {};
+    return rtde::read_accepted(*packet_result);
+  };
+  const auto refused = [](const char* what) {
+    return Error{Code::kInvalidArgument, fmt::format("the controller refused {}", what)};
   };
   const auto recipe = [&](const Packet& request, const std::vector<std::string>& names) -> Result<rtde::Recipe> {
     auto packet_result = answer(request, deadline);
     if (!packet_result) return packet_result.error();
-    const auto reply_result = rtde::read_recipe_reply(*packet_result);
+    const auto reply_result = rtde::read_recipe_reply(*packet_result, protocol_);
     if (!reply_result) return reply_result.error();
     return rtde::agree(names, *reply_result);
   };
-  if (auto ok = accepted(rtde::protocol_request(2), "version 2 of the protocol: its software is too old"); !ok)
-    return ok;
+  auto agreed = accepted(rtde::protocol_request(2));
+  if (agreed && *agreed) {
+    protocol_ = rtde::Version::k2;
+  } else if (agreed) {
+    agreed = accepted(rtde::protocol_request(1));
+  }
+  if (!agreed) return agreed.error();
+  if (!*agreed) return refused("versions 2 and 1 of the protocol");
   auto version_packet = answer(rtde::version_request(), deadline);
   if (!version_packet) return version_packet.error();
   auto version_result = rtde::read_version(*version_packet);
   if (!version_result) return version_result.error();
   version_ = *version_result;
-  auto outputs_result = recipe(
-      rtde::outputs_request(frequency > 0 ? frequency : std::round(1.0 / cycle()), output_names()), output_names());
+  auto outputs_result =
+      recipe(rtde::outputs_request(frequency > 0 ? frequency : std::round(1.0 / cycle()), output_names(), protocol_),
+             output_names());
   if (!outputs_result) return outputs_result.error();
   outputs_ = std::move(outputs_result).value();
   auto inputs_result = recipe(rtde::inputs_request(input_names()), input_names());
   if (!inputs_result) return inputs_result.error();
   inputs_ = std::move(inputs_result).value();
-  return accepted(rtde::start_request(), "to start");
+  const auto started = accepted(rtde::start_request());
+  if (!started) return started.error();
+  if (!*started) return refused("to start");
+  return {};
 }
 
 Result<ArmState> RtdeClient::decode(const Packet& packet) const {
   BigEndianReader in(packet.payload);
-  const auto id = in.get<std::uint8_t>();
+  const auto id = protocol_ == rtde::Version::k2 ? in.get<std::uint8_t>() : outputs_.id;
   if (id != outputs_.id || in.left() != outputs_.size()) {
     return Error{Code::kInvalidArgument, fmt::format("{}: got a sample of recipe {} with {} bytes, wanted {} with {}",
                                                      tcp_.place(), id, in.left(), outputs_.id, outputs_.size())};
@@ -165,7 +175,7 @@ Result<void> RtdeClient::send(const ArmCommand& command, TimePoint deadline) {
   values_.emplace_back(command.number);
   for (const double value : command.values) values_.emplace_back(value);
   values_.emplace_back(command.acceleration);
-  return tcp_.write(rtde::encode(rtde::pack(inputs_, values_)), deadline);
+  return tcp_.write(rtde::encode(rtde::pack(inputs_, values_, protocol_)), deadline);
 }
 
 }  // namespace jostle::robot_bridge::ur

@@ -36,7 +36,8 @@ struct ArmCommand {
   double acceleration = 0.0;  ///< rad/s²
 };
 
-/// An RtdeClient is connected, has agreed on its recipes, and gets samples.
+/// An RtdeClient is connected, has agreed on its recipes, and gets samples. It speaks version 2 of the protocol, with
+/// controllers that refuse that version 1.
 ///
 /// Threads  one at a time.
 /// Errors   kUnavailable      the controller is gone, or does not answer; kDeadline: not in time
@@ -48,6 +49,7 @@ class RtdeClient {
                                     net::Clock::time_point deadline);
 
   const rtde::ControllerVersion& version() const { return version_; }
+  rtde::Version protocol() const { return protocol_; }
   /// Returns the controller's cycle, s, by its generation.
   double cycle() const { return version_.major >= 5 ? 0.002 : 0.008; }
 
@@ -66,6 +68,7 @@ class RtdeClient {
 
   net::TcpClient tcp_;
   rtde::PacketStream stream_;
+  rtde::Version protocol_ = rtde::Version::k1;  // as every connection begins
   rtde::ControllerVersion version_;
   rtde::Recipe outputs_, inputs_;
   std::vector<rtde::Value> values_;  // of a command

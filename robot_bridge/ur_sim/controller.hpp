@@ -24,8 +24,9 @@ namespace jostle::robot_bridge::ur_sim {
 struct Generation {
   std::string model;  ///< "UR5", "UR5e"
   ur::rtde::ControllerVersion version;
-  double cycle = 0.008;             ///< s
-  bool has_remote_control = false;  ///< whether the teach pendant decides who may command
+  double cycle = 0.008;                                   ///< s
+  bool has_remote_control = false;                        ///< whether the teach pendant decides who may command
+  ur::rtde::Version newest_rtde = ur::rtde::Version::k2;  ///< old software knows version 1 only
 
   static const Generation& cb3();
   static const Generation& e_series();
@@ -119,6 +120,9 @@ class Controller {
   };
   /// Is called from whatever makes it happen.
   std::function<void(const Event&)> on_event;
+
+  /// What it tells of its arm's geometry, its calibration.
+  ur::Dh kinematics = ur::Dh::ur5();
 
   /// What the gripper beside it wants: m/s. Part of the cycle, as one plant moves both.
   std::function<double(double dt)> opening_rate;

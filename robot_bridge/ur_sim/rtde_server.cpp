@@ -12,6 +12,7 @@ using ur::rtde::Packet;
 using ur::rtde::PacketType;
 using ur::rtde::Recipe;
 using ur::rtde::Text;
+using ur::rtde::Version;
 
 class RtdeServer::Client {
  public:
@@ -37,7 +38,7 @@ class RtdeServer::Client {
     if (peer_->unsent() > kMostUnsent) return;  // the newest is for who reads
     std::vector<ur::rtde::Value> values;
     for (const std::string& name : outputs_.names) values.push_back(*controller().output(name));
-    send(ur::rtde::pack(outputs_, values));
+    send(ur::rtde::pack(outputs_, values, version_));
   }
 
  private:
@@ -49,7 +50,7 @@ class RtdeServer::Client {
 
   // A packet that has no meaning: told, then closed, for what follows has none either.
   void complain(const Error& error) {
-    send(ur::rtde::text_packet({.level = Text::Level::kError, .text = error.message, .source = "RTDE"}));
+    send(ur::rtde::text_packet({.level = Text::Level::kError, .text = error.message, .source = "RTDE"}, version_));
     peer_->close_when_sent();
   }
 
@@ -58,7 +59,10 @@ class RtdeServer::Client {
       case PacketType::kProtocolVersion: {
         const auto version_result = ur::rtde::read_protocol_request(packet);
         if (!version_result) return version_result.error();
-        send(ur::rtde::accepted_reply(packet.type, *version_result == 2));
+        const bool accepted = *version_result == static_cast<std::uint16_t>(Version::k1) ||
+                              *version_result == static_cast<std::uint16_t>(controller().generation().newest_rtde);
+        if (accepted) version_ = static_cast<Version>(*version_result);
+        send(ur::rtde::accepted_reply(packet.type, accepted));
         return {};
       }
       case PacketType::kControllerVersion:
@@ -83,12 +87,13 @@ class RtdeServer::Client {
     }
     send(ur::rtde::text_packet({.level = Text::Level::kWarning,
                                 .text = fmt::format("packet type {}: unknown", static_cast<int>(packet.type)),
-                                .source = "RTDE"}));
+                                .source = "RTDE"},
+                               version_));
     return {};
   }
 
   Result<void> agree_on_outputs(const Packet& packet) {
-    const auto request_result = ur::rtde::read_outputs_request(packet);
+    const auto request_result = ur::rtde::read_outputs_request(packet, version_);
     if (!request_result) return request_result.error();
     const double most = 1.0 / controller().generation().cycle;
     ur::rtde::RecipeReply reply{.id = 1, .types = {}};
@@ -103,14 +108,16 @@ class RtdeServer::Client {
     streams_ = false;
     outputs_ = reply.id == 0 ? Recipe{} : recipe;
     frequency_ = std::min(request_result->frequency, most);
-    send(ur::rtde::recipe_reply(packet.type, reply));
+    send(ur::rtde::recipe_reply(packet.type, reply, version_));
     return {};
   }
 
   Result<void> agree_on_inputs(const Packet& packet) {
     const auto names_result = ur::rtde::read_inputs_request(packet);
     if (!names_result) return names_result.error();
-    ur::rtde::RecipeReply reply{.id = static_cast<std::uint8_t>(inputs_.size() + 1), .types = {}};
+    // Without numbers there is one: the newest.
+    const std::size_t others = version_ == Version::k1 ? 0 : inputs_.size();
+    ur::rtde::RecipeReply reply{.id = static_cast<std::uint8_t>(others + 1), .types = {}};
     Recipe recipe{.id = reply.id, .names = *names_result, .types = {}};
     for (const std::string& name : recipe.names) {
       const auto type = ur::rtde::input_field(name);
@@ -120,22 +127,23 @@ class RtdeServer::Client {
       if (!type || taken) reply.id = 0;
       recipe.types.push_back(type.value_or(ur::rtde::FieldType::kBool));
     }
-    if (recipe.names.empty() || inputs_.size() >= kMostRecipes) reply.id = 0;
+    if (recipe.names.empty() || others >= kMostRecipes) reply.id = 0;
     if (reply.id != 0) {
       for (const std::string& name : recipe.names) server_.claims_[name] = this;
+      inputs_.resize(others);
       inputs_.push_back(std::move(recipe));
     }
-    send(ur::rtde::recipe_reply(packet.type, reply));
+    send(ur::rtde::recipe_reply(packet.type, reply, version_));
     return {};
   }
 
   Result<void> take_inputs(const Packet& packet) {
-    const std::uint8_t id = packet.payload.empty() ? 0 : packet.payload.front();
+    const std::uint8_t id = version_ == Version::k1 ? 1 : packet.payload.empty() ? 0 : packet.payload.front();
     if (id == 0 || id > inputs_.size()) {
       return Error{Code::kInvalidArgument, fmt::format("rtde U: got recipe {}, wanted 1 to {}", id, inputs_.size())};
     }
     const Recipe& recipe = inputs_[id - 1];
-    auto values_result = ur::rtde::unpack(recipe, packet);
+    auto values_result = ur::rtde::unpack(recipe, packet, version_);
     if (!values_result) return values_result.error();
     for (std::size_t i = 0; i < recipe.names.size(); ++i) controller().set_input(recipe.names[i], (*values_result)[i]);
     return {};
@@ -144,7 +152,8 @@ class RtdeServer::Client {
   RtdeServer& server_;
   const std::shared_ptr<net::Peer> peer_;
   ur::rtde::PacketStream stream_;
-  Recipe outputs_;  // id 0: none
+  Version version_ = Version::k1;  // until both have agreed on 2
+  Recipe outputs_;                 // id 0: none
   std::vector<Recipe> inputs_;
   double frequency_ = 0.0, due_ = 0.0;  // 1/s; samples
   bool streams_ = false;

@@ -12,7 +12,7 @@
 
 namespace jostle::robot_bridge::ur_sim {
 
-/// Serves RTDE version 2 to any number of clients. One thread, the io_context's.
+/// Serves RTDE, versions 1 and 2, to any number of clients. One thread, the io_context's.
 class RtdeServer {
  public:
   static constexpr std::size_t kMostClients = 32;

@@ -85,7 +85,7 @@ void ScriptServer::publish() {
                        .safety_mode = controller_.safety_mode(),
                        .is_program_running = controller_.is_running(),
                        .is_program_paused = controller_.runtime_state() == ur::RuntimeState::kPaused,
-                       .kinematics = ur::Dh::ur5()};
+                       .kinematics = controller_.kinematics};
   state.q = std::get<Joints>(*controller_.output("actual_q"));
   state.qd = std::get<Joints>(*controller_.output("actual_qd"));
   state.q_target = std::get<Joints>(*controller_.output("target_q"));

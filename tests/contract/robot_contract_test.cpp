@@ -386,6 +386,12 @@ INSTANTIATE_TEST_SUITE_P(InProcess, ObedientRobotContract, in_both_scenes<InProc
 INSTANTIATE_TEST_SUITE_P(InProcess, GripperContract, with_gripper<InProcessRig>(), scene_name);
 INSTANTIATE_TEST_SUITE_P(InProcess, InterruptibleRobotContract, in_both_scenes<InProcessRig>(), scene_name);
 INSTANTIATE_TEST_SUITE_P(InProcess, ResumableRobotContract, in_both_scenes<InProcessRig>(), scene_name);
+INSTANTIATE_TEST_SUITE_P(Guarded, RobotContract, in_both_scenes<GuardedRig>(), scene_name);
+INSTANTIATE_TEST_SUITE_P(Guarded, KnownRobotContract, in_both_scenes<GuardedRig>(), scene_name);
+INSTANTIATE_TEST_SUITE_P(Guarded, ObedientRobotContract, in_both_scenes<GuardedRig>(), scene_name);
+INSTANTIATE_TEST_SUITE_P(Guarded, GripperContract, with_gripper<GuardedRig>(), scene_name);
+INSTANTIATE_TEST_SUITE_P(Guarded, InterruptibleRobotContract, in_both_scenes<GuardedRig>(), scene_name);
+INSTANTIATE_TEST_SUITE_P(Guarded, ResumableRobotContract, in_both_scenes<GuardedRig>(), scene_name);
 INSTANTIATE_TEST_SUITE_P(Client, RobotContract, in_both_scenes<ClientRig>(), scene_name);
 INSTANTIATE_TEST_SUITE_P(Client, KnownRobotContract, in_both_scenes<ClientRig>(), scene_name);
 INSTANTIATE_TEST_SUITE_P(Client, ObedientRobotContract, in_both_scenes<ClientRig>(), scene_name);

@@ -18,6 +18,8 @@
 #include <vector>
 
 #include "robot_bridge/net/tcp_client.hpp"
+#include "robot_bridge/ur/control_program.hpp"
+#include "robot_bridge/ur/modes.hpp"
 #include "robot_bridge/ur/rtde.hpp"
 #include "tests/support/run_fixture.hpp"
 
@@ -39,9 +41,11 @@ class Onlooker {
       return tcp_.has_value();
     });
     if (!tcp_) throw std::runtime_error("no controller at " + address);
-    for (const auto& packet : {robot_bridge::ur::rtde::protocol_request(2),
-                               robot_bridge::ur::rtde::outputs_request(125, {"timestamp", "actual_qd"}),
-                               robot_bridge::ur::rtde::start_request()}) {
+    for (const auto& packet :
+         {robot_bridge::ur::rtde::protocol_request(2),
+          robot_bridge::ur::rtde::outputs_request(
+              125, {"timestamp", "actual_qd", "robot_mode", "safety_mode", "runtime_state", "output_int_register_24"}),
+          robot_bridge::ur::rtde::start_request()}) {
       if (!tcp_->write(robot_bridge::ur::rtde::encode(packet), Clock::now() + kPatience))
         throw std::runtime_error("it does not listen");
     }
@@ -49,6 +53,8 @@ class Onlooker {
 
   struct Sample {
     double time = 0.0, fastest = 0.0;  // s of the controller, rad/s of the fastest joint
+    bool may_move = false;             // on, brakes released, no stop
+    bool is_commanded = false;         // and the bridge's program runs
   };
   Sample next() {
     std::array<std::uint8_t, 4096> room;
@@ -60,6 +66,13 @@ class Onlooker {
         (void)in.get<std::uint8_t>();
         Sample sample{.time = in.get<double>()};
         for (const double v : in.get_array<double, 6>()) sample.fastest = std::max(sample.fastest, std::abs(v));
+        const auto robot_mode = static_cast<robot_bridge::ur::RobotMode>(in.get<std::int32_t>());
+        const auto safety_mode = static_cast<robot_bridge::ur::SafetyMode>(in.get<std::int32_t>());
+        sample.may_move =
+            robot_mode == robot_bridge::ur::RobotMode::kRunning && safety_mode == robot_bridge::ur::SafetyMode::kNormal;
+        const auto runtime = static_cast<robot_bridge::ur::RuntimeState>(in.get<std::uint32_t>());
+        sample.is_commanded = runtime == robot_bridge::ur::RuntimeState::kPlaying && sample.may_move &&
+                              in.get<std::int32_t>() == robot_bridge::ur::contract::kReady;
         return sample;
       }
       if (*packet) continue;

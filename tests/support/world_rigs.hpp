@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "physics_pool/local/execution_world.hpp"
+#include "robot_bridge/safety/guard.hpp"
 #include "services/bags/replay/recorded_world.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/reader.hpp"
@@ -81,6 +82,33 @@ class InProcessRig final : public WorldRig {
   physics_pool::ExecutionWorld world_{compiled(scene)};
   world::SimulatedRobot robot_{world_};
   world::SimulatedObjects objects_{world_, scene};
+};
+
+/// A guard around that one.
+class GuardedRig final : public WorldRig {
+ public:
+  explicit GuardedRig(const physics_pool::Scene& its_scene) : WorldRig(its_scene) {}
+
+  robot_bridge::Robot& robot() override { return guard_; }
+  perception::ObjectSource& objects() override { return inside_.objects(); }
+  double time() override { return inside_.time(); }
+  State truth() override { return inside_.truth(); }
+
+ private:
+  robot_bridge::GuardOptions options() const {
+    robot_bridge::GuardOptions options;
+    for (const physics_pool::Axis& axis : scene.robot.model.axes) {
+      robot_bridge::GuardedAxis guarded{.limit = axis.limit, .change = axis.limit, .joints = {}};
+      for (const auto& [joint, share] : axis.joints)
+        guarded.joints.emplace_back(static_cast<std::size_t>(joint), share);
+      options.axes.push_back(std::move(guarded));
+    }
+    options.stray.assign(layout.joints.size(), 0.01);  // m, rad
+    return options;
+  }
+
+  InProcessRig inside_{scene};
+  robot_bridge::Guard guard_{inside_.robot(), options()};
 };
 
 /// services/world/link with a jostle_sim behind it. One at a time: a process has one participant.

@@ -69,13 +69,13 @@ std::vector<Part> parts_of_world(const RunOptions& options, const std::filesyste
   };
   switch (options.arm.kind) {
     case Arm::Kind::kUr:
-      parts.push_back(bridge(options.arm.host, {}));
+      parts.push_back(bridge(options.arm.host, {"--scene", scene.string()}));
       break;
     case Arm::Kind::kUrSim: {
       const std::string address = controller_address(domain);
       parts.push_back(part("the simulated arm", "ur_sim", simulating({scene.string(), "--address", address})));
       // It can do no harm, and this machine may be busy.
-      parts.push_back(bridge(address, {"--silence", "1", "--watchdog", "1"}));
+      parts.push_back(bridge(address, {"--scene", scene.string(), "--silence", "1", "--watchdog", "1"}));
       break;
     }
     case Arm::Kind::kSim:

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <thread>
 #include <utility>
 
 #include "services/world/link/messages.hpp"
@@ -9,6 +10,7 @@
 namespace jostle::world {
 namespace {
 
+constexpr auto kTick = std::chrono::milliseconds(2);  // the fastest controllers' cycle
 constexpr const char* kJointNames[] = {"shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
                                        "wrist_1_joint",      "wrist_2_joint",       "wrist_3_joint"};
 
@@ -27,6 +29,7 @@ Result<void> ArmBody::begin(std::span<const double> u, double duration) {
 Result<void> ArmBody::advance() {
   const auto over = robot_.advance();
   over_ = !over || *over;
+  tell_joints();
   if (!over) return over.error();
   return {};
 }
@@ -45,7 +48,9 @@ Result<bool> ArmBody::rest() {
     now.empty() ? spdlog::info("the arm is ready again") : spdlog::warn("{}", now);
     said_ = now;
   }
-  return false;
+  tell_joints();
+  std::this_thread::sleep_for(kTick);
+  return true;
 }
 
 robot_bridge::RobotReading ArmBody::reading() {
@@ -53,10 +58,13 @@ robot_bridge::RobotReading ArmBody::reading() {
   return reading_;
 }
 
-void ArmBody::publish() {
+void ArmBody::tell_joints() {
+  const double stamp = reading().stamp;
   const robot_bridge::ur::ArmState& state = hand_.arm_state();
+  if (state.received == told_) return;
+  told_ = state.received;
   sensor_msgs::msg::JointState message;
-  message.header(make_header(reading().stamp));
+  message.header(make_header(stamp));
   for (std::size_t j = 0; j < state.q.size(); ++j) {
     message.name().emplace_back(kJointNames[j]);
     message.position().push_back(state.q[j]);

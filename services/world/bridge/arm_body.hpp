@@ -14,7 +14,8 @@
 
 namespace jostle::world {
 
-/// An ArmBody is an arm's hand on DDS, with the arm's joints beside it. Stamps are of the time of day.
+/// An ArmBody is an arm's hand on DDS, with the arm's joints beside it, as often as the controller tells them (up to
+/// 500 times a second). Stamps are of the time of day.
 class ArmBody final : public Body {
  public:
   /// `hand` is asked what only it knows; commands and readings pass through `robot`, which is `hand` or stands before
@@ -31,15 +32,18 @@ class ArmBody final : public Body {
   std::optional<std::chrono::milliseconds> patience() const override { return patience_; }
   std::chrono::milliseconds period() const override { return std::chrono::milliseconds(20); }
   robot_bridge::RobotReading reading() override;
-  void publish() override;
+  void publish() override { tell_joints(); }
 
  private:
+  void tell_joints();
+
   robot_bridge::ur::ArmHand& hand_;
   robot_bridge::Robot& robot_;
   const std::chrono::milliseconds patience_;
   bool over_ = true;
-  std::string said_;                    // the trouble that was told last
-  robot_bridge::RobotReading reading_;  // the last good one
+  std::string said_;                              // the trouble that was told last
+  robot_bridge::RobotReading reading_;            // the last good one
+  std::chrono::steady_clock::time_point told_{};  // when the sample came whose joints were published last
   wire::Writer<sensor_msgs::msg::JointState> joints_;
 };
 

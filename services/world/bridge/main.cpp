@@ -6,12 +6,14 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "services/common/process/command_line.hpp"
 #include "services/common/process/domain_claim.hpp"
 #include "services/common/process/program.hpp"
 #include "services/world/bridge/arm_body.hpp"
+#include "services/world/bridge/arm_guard.hpp"
 
 int main(int argc, char** argv) {
   using namespace jostle;
@@ -23,7 +25,8 @@ int main(int argc, char** argv) {
   robot_bridge::ur::PlanarArmOptions arm_options;
   robot_bridge::robotiq::Client::Options gripper_options;
   std::string gripper = "robotiq";
-  double patience = 30.0, silence = 0.07;
+  double patience = 30.0, silence = 0.06;
+  std::string scene_file;
   auto* ur5 = app.add_subcommand("ur5", "A UR5 or UR5e, whose hand moves level above a surface");
   ur5->add_option("--host", arm_options.host, "The controller's address or name")->capture_default_str();
   ur5->add_option("--gripper", gripper, "robotiq: a 2F-85 at the controller's port 63352; none")
@@ -35,6 +38,7 @@ int main(int argc, char** argv) {
   ur5->add_option("--height", arm_options.mounting.height, "Of the hand's middle above the surface, m")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1.0));
+  ur5->add_option("--scene", scene_file, "Scene file whose fixtures the arm must not touch (default: none)");
   ur5->add_option("--watchdog", arm_options.watchdog, "Seconds without a word from the bridge that stop the arm")
       ->capture_default_str()
       ->check(CLI::Range(0.02, 10.0));
@@ -56,6 +60,12 @@ int main(int argc, char** argv) {
     spdlog::error("{}", error.message);
     return common::exit_code_of(error);
   };
+  physics_pool::Scene scene;
+  if (!scene_file.empty()) {
+    auto scene_result = physics_pool::load_scene(scene_file);
+    if (!scene_result) return fail(scene_result.error());
+    scene = std::move(scene_result).value();
+  }
   auto participant_result = wire::Participant::open(
       {.name = "jostle_bridge", .domain = process.domain, .role = wire::Role::kRobot, .waits_for_server = true});
   if (!participant_result) return fail(participant_result.error());
@@ -68,7 +78,8 @@ int main(int argc, char** argv) {
     std::optional<robot_bridge::robotiq::Client> client;
     if (gripper == "robotiq") client.emplace(gripper_options);
     robot_bridge::ur::ArmHand hand(arm, client ? &*client : nullptr);
-    ArmBody body(*participant_result, hand, hand, std::chrono::milliseconds(std::lround(1e3 * silence)));
+    robot_bridge::Guard guard(hand, arm_guard(hand, arm_options, scene.fixtures));
+    ArmBody body(*participant_result, hand, guard, std::chrono::milliseconds(std::lround(1e3 * silence)));
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience);
     std::string said;
     for (std::string trouble; !(trouble = hand.trouble()).empty();) {
@@ -77,6 +88,10 @@ int main(int argc, char** argv) {
         return fail(
             {Code::kUnavailable, fmt::format("{}: not ready within {:g} s: {}", arm_options.host, patience, trouble)});
       if (!common::pause_until(std::chrono::steady_clock::now() + 50ms, signal.token())) return common::kExitOk;
+    }
+    if (const auto off = arm.calibration()) {
+      spdlog::info("its calibration puts the hand up to {:.1f} mm and {:.2f} degrees from where it is taken to be",
+                   1e3 * off->distance, off->angle * 180 / std::numbers::pi);
     }
     spdlog::info("UR5 at {} ready on domain {}", arm_options.host, participant_result->domain());
     RobotServer server(*participant_result, body);

@@ -64,9 +64,9 @@ void RobotServer::say_troubles() {
   foreign_.say();
 }
 
-// While an action is at work: whether its commander has had enough of it.
-bool RobotServer::told_to_stop(const Action& action) {
-  bool told = false;
+// While an action is at work: whether its commander has had enough of it, or says what it should not.
+std::optional<Error> RobotServer::interrupted(const Action& action) {
+  std::optional<Error> why;
   for (Letter& letter : commands_.take_letters()) {
     if (letter.writer != commander_) {
       make_wait(std::move(letter));
@@ -75,11 +75,32 @@ bool RobotServer::told_to_stop(const Action& action) {
     heard_ = steady_clock::now();
     const auto& command = letter.sample;
     if (command.epoch() == action.epoch && command.sequence_number() == action.sequence_number) continue;  // repeated
-    told = told || (is_stop(command) && command.epoch() == epoch_ && command.sequence_number() > accepted_);
+    const bool stops = is_stop(command) && command.epoch() == epoch_ && command.sequence_number() > accepted_;
+    if (stops) {
+      why = Error{Code::kCancelled, "told to stop"};
+    } else if (const auto harm = body_.patience() ? harm_of(command, action) : std::nullopt) {
+      if (!why) why = Error{Code::kUnavailable, *harm + "; the motion was ended"};
+      if (command.epoch() != epoch_) continue;  // who means it says it again, to a robot that stands
+    }
     waiting_.push_back(std::move(letter));
     if (waiting_.size() > kCommandQueue) waiting_.pop_front();  // as the inbox does
   }
-  return told;
+  return why;
+}
+
+// What is wrong with a command of the commander that comes while an action is at work.
+std::optional<std::string> RobotServer::harm_of(const jostle_msgs::msg::VelocityCommand& command,
+                                                const Action& action) const {
+  if (command.epoch() != epoch_) {
+    return fmt::format("command {}/{} came while one of epoch {} was at work", command.epoch(),
+                       command.sequence_number(), epoch_);
+  }
+  if (command.sequence_number() < action.sequence_number) {
+    return fmt::format("command {} came out of order, after {}", command.sequence_number(), action.sequence_number);
+  }
+  const auto ok = robot_bridge::check_command(command.velocities(), limits_, command.duration());
+  if (ok) return {};
+  return fmt::format("command {}: {}", command.sequence_number(), ok.error().message);
 }
 
 bool RobotServer::may_command(const Letter& letter) const {
@@ -178,9 +199,14 @@ Result<void> RobotServer::move(const Action& action, std::stop_token stop) {
   if (auto ok = body_.begin(action.u, action.duration); !ok) return ok;
   heard_ = steady_clock::now();
   while (!body_.is_over()) {
-    if (stop.stop_requested() || told_to_stop(action)) {
+    if (stop.stop_requested()) {
       body_.halt();
       break;
+    }
+    if (auto why = interrupted(action)) {
+      body_.halt();
+      if (why->code == Code::kCancelled) break;
+      return *std::move(why);
     }
     if (const auto patience = body_.patience(); patience && steady_clock::now() - heard_ > *patience) {
       body_.halt();

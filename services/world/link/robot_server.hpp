@@ -45,7 +45,7 @@ class Body {
   virtual Result<bool> rest() = 0;
 
   /// Returns how long its commander may be silent while a motion is at work, before the motion is ended; nothing where
-  /// that does no harm. Commanders repeat a command each time they hear that it is at work.
+  /// the body can do no harm. Commanders repeat a command each time they hear that it is at work.
   virtual std::optional<std::chrono::milliseconds> patience() const { return {}; }
   /// Returns the time between two statuses, by the wall clock.
   virtual std::chrono::milliseconds period() const { return std::chrono::milliseconds(50); }
@@ -63,8 +63,9 @@ class Body {
 /// good command is, and a newcomer that comes sooner waits for some seconds. A commander's new
 /// epoch ends its old one for good. Commands carry a sequence number; one that is done already is
 /// counted and dropped, a bad one of the commander is refused in `RobotStatus.error`.
-/// A stop (messages.hpp) ends the command at work at once, and so does a commander's silence if the body wants it;
-/// everything else waits for its turn. The robot stands still when no command is at work.
+/// A stop (messages.hpp) ends the command at work at once. So does, where the body can do harm, a commander's silence,
+/// and whatever it says that it should not: a command that is bad, out of order, or of another epoch, which is not
+/// obeyed either. Everything else waits for its turn. The robot stands still when no command is at work.
 class RobotServer {
  public:
   RobotServer(const wire::Participant& participant, Body& body);
@@ -87,7 +88,8 @@ class RobotServer {
   };
 
   void receive();
-  bool told_to_stop(const Action& action);
+  std::optional<Error> interrupted(const Action& action);
+  std::optional<std::string> harm_of(const jostle_msgs::msg::VelocityCommand& command, const Action& action) const;
   bool may_command(const Letter& letter) const;
   void make_wait(Letter letter);
   void accept(Letter letter);

@@ -61,7 +61,7 @@ TEST(ArmShapes, DistancesToABoxAreThoseOfGeometry) {
 
 TEST(ArmShapes, HandThatIsHeldLevelTouchesNothing) {
   // Nearer to its base the folded forearm comes beside the shoulder.
-  for (double x = -0.35; x <= 0.05; x += 0.05) {
+  for (double x = -0.43; x <= 0.23; x += 0.04) {
     for (double y = -0.3; y <= 0.3; y += 0.05) {
       for (const double rotation : {-0.6, 0.0, 0.6}) {
         const auto q = planar::joints_at(kMounting, Dh::ur5(), {x, y, rotation});

@@ -149,6 +149,7 @@ TEST_F(RtdeLink, TheServerNamesFieldsThatItDoesNotHave) {
   ticks = false;
   auto tcp = net::TcpClient::connect("127.0.0.1", port, Clock::now() + kPatience);
   ASSERT_TRUE(tcp);
+  ASSERT_EQ(converse(*tcp, rtde::encode(rtde::protocol_request(2)), 1).size(), 1u);
   const auto packets = converse(*tcp, rtde::encode(rtde::outputs_request(125, {"timestamp", "no_such_thing"})), 1);
   ASSERT_EQ(packets.size(), 1u);
   const auto reply = rtde::read_recipe_reply(packets[0]);

@@ -44,6 +44,40 @@ TEST(RtdeBytes, AreThoseOfTheProtocol) {
               ElementsAre(0, 16, 'U', 7, 0xFF, 0xFF, 0xFF, 0xFF, 0x3F, 0xF0, 0, 0, 0, 0, 0, 0));
 }
 
+// As every connection begins, and as it stays with old software.
+TEST(RtdeBytes, OfVersion1HaveNoNumbersOfRecipesNoFrequencyAndNoSource) {
+  EXPECT_THAT(encode(outputs_request(125, {"robot_mode"}, Version::k1)),
+              ElementsAre(0, 13, 'O', 'r', 'o', 'b', 'o', 't', '_', 'm', 'o', 'd', 'e'));
+  EXPECT_THAT(encode(recipe_reply(PacketType::kOutputs, {.id = 1, .types = {"INT32"}}, Version::k1)),
+              ElementsAre(0, 8, 'O', 'I', 'N', 'T', '3', '2'));
+  EXPECT_THAT(encode(text_packet({.level = Text::Level::kWarning, .text = "hot", .source = "me"}, Version::k1)),
+              ElementsAre(0, 7, 'M', 2, 'h', 'o', 't'));
+  const Recipe recipe{.id = 1, .names = {"robot_mode"}, .types = {FieldType::kInt32}};
+  EXPECT_THAT(encode(pack(recipe, {std::int32_t{7}}, Version::k1)), ElementsAre(0, 7, 'U', 0, 0, 0, 7));
+}
+
+TEST(RtdeMessages, OfVersion1AreReadAsTheyWereWritten) {
+  const auto outputs = read_outputs_request(outputs_request(500, {"actual_q", "robot_mode"}, Version::k1), Version::k1);
+  ASSERT_TRUE(outputs);
+  EXPECT_EQ(outputs->frequency, 125);
+  EXPECT_THAT(outputs->names, ElementsAre("actual_q", "robot_mode"));
+  const RecipeReply good{.id = 1, .types = {"DOUBLE", "INT32"}}, refused{.id = 0, .types = {"DOUBLE", "IN_USE"}};
+  for (const RecipeReply& reply : {good, refused}) {
+    EXPECT_EQ(*read_recipe_reply(recipe_reply(PacketType::kInputs, reply, Version::k1), Version::k1), reply);
+  }
+  EXPECT_EQ(read_recipe_reply({.type = PacketType::kOutputs, .payload = {}}, Version::k1)->id, 0);
+  const Text text{.level = Text::Level::kError, .text = "no", .source = ""};
+  EXPECT_EQ(*read_text(text_packet(text, Version::k1), Version::k1), text);
+  EXPECT_FALSE(read_text({.type = PacketType::kText, .payload = {}}, Version::k1));
+  EXPECT_FALSE(read_text({.type = PacketType::kText, .payload = {4, 'x'}}, Version::k1)) << "a level of 4";
+  const Recipe recipe{.id = 1, .names = {"timestamp"}, .types = {FieldType::kDouble}};
+  Packet data = pack(recipe, {1.5}, Version::k1);
+  EXPECT_EQ(unpack(recipe, data, Version::k1)->front(), Value(1.5));
+  EXPECT_FALSE(unpack(recipe, data)) << "one byte is missing in version 2";
+  data.payload.pop_back();
+  EXPECT_FALSE(unpack(recipe, data, Version::k1));
+}
+
 TEST(RtdeMessages, AreReadAsTheyWereWritten) {
   EXPECT_EQ(*read_protocol_request(protocol_request(2)), 2);
   const auto outputs = read_outputs_request(outputs_request(500, {"actual_q", "robot_mode"}));
@@ -78,12 +112,13 @@ TEST(RtdeMessages, OfAWrongSizeAreRefusedAtEveryByte) {
   refused(protocol_request(2), read_protocol_request);
   refused(accepted_reply(PacketType::kStart, true), read_accepted);
   refused(version_reply({}), read_version);
-  refused(text_packet({.level = Text::Level::kInfo, .text = "hello", .source = "x"}), read_text);
+  refused(text_packet({.level = Text::Level::kInfo, .text = "hello", .source = "x"}),
+          [](const Packet& packet) { return read_text(packet); });
   const Recipe recipe{.id = 1, .names = {"actual_q"}, .types = {FieldType::kVector6d}};
   refused(pack(recipe, {std::array<double, 6>{1, 2, 3, 4, 5, 6}}),
           [&](const Packet& packet) { return unpack(recipe, packet); });
   Packet outputs = outputs_request(125, {});
-  refused(outputs, read_outputs_request);
+  refused(outputs, [](const Packet& packet) { return read_outputs_request(packet); });
 
   Packet longer = version_reply({});
   longer.payload.push_back(0);
@@ -147,6 +182,9 @@ TEST(RtdeStream, SurvivesRandomBytes) {
       (void)read_version(**packet);
       (void)read_recipe_reply(**packet);
       (void)read_text(**packet);
+      (void)read_outputs_request(**packet, Version::k1);
+      (void)read_recipe_reply(**packet, Version::k1);
+      (void)read_text(**packet, Version::k1);
     }
   }
 }

@@ -25,7 +25,9 @@ constexpr double kLatest = 10.0;                        // times its period: lat
 constexpr double kFewResults = 1.0 / 64.0;              // weight of one more in the share of the wrongly dead
 constexpr double kCaution = 50.0;                       // of 2 % wrongly dead makes silence twice as long
 constexpr int kCrowd = 64;                              // workers that may be heard ten times a second
-constexpr std::chrono::seconds kAskedLately{1};         // for another period
+constexpr std::chrono::seconds kAskedLately{1};         // for another period, or found that there is no need
+
+double load_of(std::size_t held, int capacity) { return static_cast<double>(held) / capacity; }
 
 }  // namespace
 
@@ -133,14 +135,15 @@ int Scheduler::usable_workers(TimePoint now) const {
 }
 
 std::optional<std::chrono::milliseconds> Scheduler::period_to_ask(TimePoint now) {
+  if (now < last_asked_ + kAskedLately) return {};
   const auto alive = std::ranges::count_if(workers_, [](const auto& entry) { return entry.second.status.alive; });
   const auto wanted = std::clamp(kHeartbeatPeriod * alive / kCrowd, kHeartbeatPeriod, kLongestHeartbeatPeriod);
   const auto knows = [&](const auto& entry) {
     const auto& period = entry.second.period;  // a little more or less is not worth a message
     return !entry.second.status.alive || (period <= wanted + wanted / 4 && period >= wanted - wanted / 4);
   };
-  if (now < last_asked_ + kAskedLately || std::ranges::all_of(workers_, knows)) return {};
   last_asked_ = now;
+  if (std::ranges::all_of(workers_, knows)) return {};
   return wanted;
 }
 
@@ -243,27 +246,26 @@ void Scheduler::take_back(Worker& worker, TimePoint sent_before, Fate fate) {
 // other samples have gone there.
 int Scheduler::room(const Worker& worker) const {
   if (worker.others == 0 || typical_run_.count() <= 0) {
-    const double on_the_way = typical_run_.count() > 0 ? std::min(kWays * typical_way_ / typical_run_, 1.0) : 0.0;
+    const std::chrono::duration<double> way = typical_way_ + gathering_time(worker.period);
+    const double on_the_way = typical_run_.count() > 0 ? std::min(kWays * way / typical_run_, 1.0) : 0.0;
     return worker.status.capacity + std::max(kSpare, static_cast<int>(on_the_way * worker.status.capacity));
   }
   const double cover = std::clamp(std::ceil(kCover / typical_run_), 1.0, kMostCover);
   return worker.status.capacity * static_cast<int>(cover) + kSpare;
 }
 
-// The usable worker with the emptiest hands, relative to its size.
-std::pair<const WorkerId, Scheduler::Worker>* Scheduler::least_loaded(TimePoint now) {
-  std::pair<const WorkerId, Worker>* best = nullptr;
-  double least = 0.0;
-  for (auto& entry : workers_) {
-    const Worker& worker = entry.second;
-    const auto held = static_cast<int>(worker.outstanding.size());
-    if (!usable(worker, now) || held >= room(worker)) continue;
-    const double load = static_cast<double>(held) / worker.status.capacity;
-    if (best && load >= least) continue;
-    best = &entry;
-    least = load;
+// All of them; not in order.
+std::vector<Scheduler::Seat> Scheduler::seats(TimePoint now) {
+  std::vector<Seat> found;
+  for (auto& [id, worker] : workers_) {
+    if (!usable(worker, now)) continue;
+    const Seat seat{.load = load_of(worker.outstanding.size(), worker.status.capacity),
+                    .id = id,
+                    .worker = &worker,
+                    .room = room(worker)};
+    if (std::cmp_less(worker.outstanding.size(), seat.room)) found.push_back(seat);
   }
-  return best;
+  return found;
 }
 
 bool Scheduler::next_sample(Choice& choice) {
@@ -364,12 +366,31 @@ void Scheduler::give(WorkerId id, Worker& worker, const Choice& choice, TimePoin
   worker.outstanding.push_back({.epoch = choice.epoch, .sample = choice.sample, .since = now});
 }
 
+// The emptiest hands, relative to their size, first. A heap: with hundreds of workers one search for each sample is
+// what keeps the dispatcher busy.
+void Scheduler::assign_new(TimePoint now, std::vector<Assignment>& assignments) {
+  std::vector<Seat> heap = seats(now);
+  const auto later = [](const Seat& a, const Seat& b) { return std::pair(a.load, a.id) > std::pair(b.load, b.id); };
+  std::ranges::make_heap(heap, later);
+  Choice choice;
+  while (!heap.empty() && next_sample(choice)) {
+    std::ranges::pop_heap(heap, later);
+    Seat& seat = heap.back();
+    give(seat.id, *seat.worker, choice, now, assignments);
+    const std::size_t held = seat.worker->outstanding.size();
+    seat.load = load_of(held, seat.worker->status.capacity);
+    if (std::cmp_less(held, seat.room)) {
+      std::ranges::push_heap(heap, later);
+    } else {
+      heap.pop_back();
+    }
+  }
+}
+
 std::vector<Assignment> Scheduler::assign(TimePoint now) {
   std::vector<Assignment> assignments;
-  Choice choice;
-  while (auto* entry = least_loaded(now)) {
-    if (!next_sample(choice)) break;
-    give(entry->first, entry->second, choice, now, assignments);
+  if (std::ranges::any_of(batches_, [](const auto& entry) { return entry.second.has_some(); })) {
+    assign_new(now, assignments);
   }
   assign_copies(now, assignments);
   return assignments;

@@ -160,6 +160,8 @@ class Scheduler {
     std::set<std::uint32_t> returned;  // indices handed out and lost
     std::set<std::uint32_t> doubted;   // indices handed out and perhaps lost
     std::uint32_t missing = 0;
+
+    bool has_some() const { return next < samples.size() || !returned.empty() || !doubted.empty(); }  // to hand out
   };
   /// One sample on its way to one worker.
   struct Choice {
@@ -186,10 +188,18 @@ class Scheduler {
   enum class Fate { kLost, kDoubtful };
   void take_back(Worker& worker, TimePoint sent_before, Fate fate);
   void release(const Outstanding& outstanding);
-  std::pair<const WorkerId, Worker>* least_loaded(TimePoint now);
+  /// A worker with room for another sample.
+  struct Seat {
+    double load = 0.0;  // samples it holds, by capacity
+    WorkerId id = 0;
+    Worker* worker = nullptr;
+    int room = 0;
+  };
+  std::vector<Seat> seats(TimePoint now);
   bool next_sample(Choice& choice);
   bool next_sample_of(physics_pool::Priority priority, Choice& choice);
   std::vector<Copyable> copyable(TimePoint now) const;
+  void assign_new(TimePoint now, std::vector<Assignment>& assignments);
   void assign_copies(TimePoint now, std::vector<Assignment>& assignments);
   void give(WorkerId id, Worker& worker, const Choice& choice, TimePoint now, std::vector<Assignment>& assignments);
 
@@ -206,7 +216,7 @@ class Scheduler {
   std::chrono::nanoseconds listened_{0};  // so far
   double lateness_ = 1.0;                 // of heartbeats lately: time between two by the one that was promised
   double wrongly_dead_ = 0.0;             // share of results lately whose workers were taken for dead
-  TimePoint last_asked_;                  // for another period
+  TimePoint last_asked_;                  // for another period, or whether one is needed
   std::uint64_t reissued_ = 0;
   std::uint64_t duplicates_ = 0;
 };

@@ -18,13 +18,15 @@ std::size_t bytes_of(const msg::AssignmentResult& result) {
 
 }  // namespace
 
-bool Outbox::put(std::uint64_t client, msg::AssignmentResult result, Left left, TimePoint now) {
+bool Outbox::put(std::uint64_t client, msg::AssignmentResult result, Left left, std::chrono::nanoseconds gather,
+                 TimePoint now) {
   const std::optional<TimePoint> before = this->due();
   Box& box = boxes_[client];
   box.bytes += bytes_of(result);
   const bool is_first = box.results.empty();
   box.results.push_back(std::move(result));
-  const std::chrono::nanoseconds pause = left == Left::kWaiting ? kGather : std::chrono::nanoseconds(kBurst);
+  const std::chrono::nanoseconds pause =
+      left == Left::kWaiting ? gather : std::min<std::chrono::nanoseconds>(kBurst, gather);
   const TimePoint due = left == Left::kNothing || box.bytes >= kLong ? now : std::max(now, box.last_sent + pause);
   box.due = is_first ? due : std::min(box.due, due);
   return !before || box.due < *before;

@@ -22,12 +22,12 @@ enum class Left {
 };
 
 /// An Outbox gathers results, so that a worker with many threads sends one message where it would send
-/// dozens. A result never waits for longer than kGather, and does not wait where its client has nothing
+/// dozens. A result never waits for longer than `gather`, and does not wait where its client has nothing
 /// else here:
 ///
 ///   kNothing  leaves at once, and what waited for the client leaves with it
 ///   kRunning  leaves kBurst after the client's last message
-///   kWaiting  leaves kGather after it
+///   kWaiting  leaves `gather` after it
 ///
 /// A message that has got long leaves at once.
 ///
@@ -35,7 +35,6 @@ enum class Left {
 class Outbox {
  public:
   static constexpr std::chrono::microseconds kBurst{300};
-  static constexpr std::chrono::milliseconds kGather{3};
   /// Bytes, about, from which on a message leaves: it fits a datagram.
   static constexpr std::size_t kLong = 48'000;
 
@@ -46,7 +45,8 @@ class Outbox {
   };
 
   /// True if something has to leave sooner than before.
-  bool put(std::uint64_t client, jostle_msgs::msg::AssignmentResult result, Left left, TimePoint now);
+  bool put(std::uint64_t client, jostle_msgs::msg::AssignmentResult result, Left left, std::chrono::nanoseconds gather,
+           TimePoint now);
 
   /// Takes out what has to leave by now.
   std::vector<Group> take(TimePoint now);

@@ -291,7 +291,9 @@ void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, 
     const Left left = others == 0                                    ? Left::kNothing
                       : others <= static_cast<std::size_t>(threads_) ? Left::kRunning
                                                                      : Left::kWaiting;
-    if (outbox_.put(batch.first, std::move(result), left, std::chrono::steady_clock::now())) post(lock);
+    if (outbox_.put(batch.first, std::move(result), left, gathering_time(accounts_.at(batch.first).period),
+                    std::chrono::steady_clock::now()))
+      post(lock);
   } else {
     lock.lock();
     --accounts_.at(batch.first).samples;

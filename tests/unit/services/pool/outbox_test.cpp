@@ -14,13 +14,14 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 constexpr std::uint64_t kAnna = 1, kBert = 2;
+constexpr auto kGather = 10ms;
 
 class OutboxTest : public ::testing::Test {
  protected:
   void put(std::uint64_t client, std::uint32_t sample, Left left) {
     AssignmentResult result;
     result.sample(sample);
-    sut.put(client, std::move(result), left, now);
+    sut.put(client, std::move(result), left, kGather, now);
   }
 
   // Samples that leave for a client now.
@@ -54,7 +55,7 @@ TEST_F(OutboxTest, ResultsGatherForAWhile) {
 
   EXPECT_THAT(sent_to(kAnna), IsEmpty());
   EXPECT_EQ(sut.held(kAnna), 2u);
-  EXPECT_EQ(sut.due(), sent + Outbox::kGather);
+  EXPECT_EQ(sut.due(), sent + kGather);
   now = *sut.due();
   EXPECT_THAT(sent_to(kAnna), ElementsAre(1, 2));
   EXPECT_EQ(sut.held(kAnna), 0u);
@@ -92,17 +93,17 @@ TEST_F(OutboxTest, LongMessageLeavesAtOnce) {
   AssignmentResult result;
   result.trajectory(std::vector<double>(Outbox::kLong / sizeof(double)));
 
-  EXPECT_TRUE(sut.put(kAnna, std::move(result), Left::kWaiting, now));
+  EXPECT_TRUE(sut.put(kAnna, std::move(result), Left::kWaiting, kGather, now));
 
   EXPECT_EQ(sut.due(), now);
 }
 
 TEST_F(OutboxTest, SaysWhetherSomethingHasToLeaveSooner) {
-  EXPECT_TRUE(sut.put(kAnna, {}, Left::kWaiting, now));
+  EXPECT_TRUE(sut.put(kAnna, {}, Left::kWaiting, kGather, now));
   sut.take(now);
-  EXPECT_TRUE(sut.put(kAnna, {}, Left::kWaiting, now));
-  EXPECT_FALSE(sut.put(kAnna, {}, Left::kWaiting, now));
-  EXPECT_TRUE(sut.put(kAnna, {}, Left::kRunning, now));
+  EXPECT_TRUE(sut.put(kAnna, {}, Left::kWaiting, kGather, now));
+  EXPECT_FALSE(sut.put(kAnna, {}, Left::kWaiting, kGather, now));
+  EXPECT_TRUE(sut.put(kAnna, {}, Left::kRunning, kGather, now));
 }
 
 }  // namespace

@@ -3,8 +3,11 @@
 /// One rollout on one thread, aware of its siblings.
 
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 
 #include "physics_pool/api/rollout.hpp"
 #include "physics_pool/local/dynamics.hpp"
@@ -17,16 +20,32 @@ class BatchSignals {
   /// Takes a finished rollout's cost; rollouts that cannot beat the best one stop.
   void offer_cost(double cost) { lower(best_, cost); }
   /// Notes that a rollout succeeded; those with a higher index need not run.
-  void offer_success(std::uint32_t sample) { lower(first_success_, sample); }
-  void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
+  void offer_success(std::uint32_t sample) {
+    lower(first_success_, sample);
+    wake();
+  }
+  void cancel() {
+    cancelled_.store(true, std::memory_order_relaxed);
+    wake();
+  }
 
   double best() const { return best_.load(std::memory_order_relaxed); }
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
   bool is_obsolete(std::uint32_t sample) const {
     return cancelled() || first_success_.load(std::memory_order_relaxed) < sample;
   }
+  /// Sleeps until then, or until the sample is obsolete. True if it is not.
+  bool wait_until(std::chrono::steady_clock::time_point end, std::uint32_t sample) {
+    std::unique_lock lock(mutex_);
+    return !woken_.wait_until(lock, end, [&] { return is_obsolete(sample); });
+  }
 
  private:
+  void wake() {
+    { const std::lock_guard lock(mutex_); }  // whoever looks now sees the news, or sleeps already
+    woken_.notify_all();
+  }
+
   // The value only ever falls, so readers may see it late and stay right.
   template <class T>
   static void lower(std::atomic<T>& shared, T value) {
@@ -38,6 +57,8 @@ class BatchSignals {
   std::atomic<double> best_{kInfinity};
   std::atomic<std::uint32_t> first_success_{UINT32_MAX};
   std::atomic<bool> cancelled_{false};
+  std::mutex mutex_;  // guards nothing: sleepers need one
+  std::condition_variable woken_;
 };
 
 /// Runs one sample. The batch must have been validated against the world.

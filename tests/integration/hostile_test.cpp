@@ -146,7 +146,7 @@ TEST_F(Hostile, AssignmentsWithoutWorldsFillNoMemory) {
   const auto worker = start_worker();
   const auto heartbeat = heard_worker();
   ASSERT_TRUE(heartbeat);
-  const wire::Inbox<AssignmentResult> results(participant, wire::topics::kPoolResult, 1);
+  const wire::Inbox<AssignmentResults> results(participant, wire::topics::kPoolResult, 1);
   wire::Writer<Assignment> writer(participant, wire::topics::pool_assignment(heartbeat->worker()));
   ASSERT_TRUE(writer.wait_for_readers(deadline()));
   Assignment message = assignment(participant.id(), 1, 4);
@@ -220,7 +220,7 @@ TEST_F(Hostile, BatchOfWhichNothingComesBackSaysSoAndEnds) {
   const wire::Inbox<Assignment> swallows(participant, wire::topics::pool_assignment(7), 1);
   start({easy, "--workers", "0", "--plan-only", "--parameters", plain});
 
-  wire::Writer<AssignmentResult> results(participant, wire::topics::kPoolResult);
+  wire::Writer<AssignmentResults> results(participant, wire::topics::kPoolResult);
   soon(2 * kPatience, [&] {
     WorkerHeartbeat heartbeat;
     heartbeat.worker(7);

@@ -78,10 +78,9 @@ RemotePool::RemotePool(const wire::Participant& participant, const RemotePoolOpt
       last_usable_(std::chrono::steady_clock::now()),
       world_writer_(participant, wire::topics::kPoolWorld),
       control_writer_(participant, wire::topics::kPoolControl),
-      result_reader_(participant, wire::topics::kPoolResult,
-                     [this](msg::AssignmentResult& result, const wire::Origin& origin) {
-                       if (result.client() == client_) take_in(std::move(result), origin.participant);
-                     }),
+      result_reader_(
+          participant, wire::topics::kPoolResult,
+          [this](msg::AssignmentResults& results, const wire::Origin& origin) { take_in(std::move(results), origin); }),
       heartbeat_reader_(participant, wire::topics::kPoolWorker,
                         [this](const msg::WorkerHeartbeat& heartbeat, const wire::Origin& origin) {
                           take_in(heartbeat, origin.participant);
@@ -90,33 +89,46 @@ RemotePool::RemotePool(const wire::Participant& participant, const RemotePoolOpt
 
 RemotePool::~RemotePool() = default;
 
-void RemotePool::take_in(msg::AssignmentResult&& result, std::uint64_t writer) {
+void RemotePool::take_in(msg::AssignmentResults&& results, const wire::Origin& origin) {
   const auto now = std::chrono::steady_clock::now();
   const std::lock_guard lock(mutex_);
-  const auto owner = participants_.find(result.worker());
-  if (owner == participants_.end() || owner->second != writer) {
-    foreign_.note("a result of worker {:016x} was dropped: participant {:016x} wrote it", result.worker(), writer);
+  const auto owner = participants_.find(results.worker());
+  if (owner == participants_.end() || owner->second != origin.participant) {
+    if (results.client() != client_) return;
+    foreign_.note("results of worker {:016x} were dropped: participant {:016x} wrote them", results.worker(),
+                  origin.participant);
     return;
   }
-  if (results_.size() >= limits::kUnreadResults) {  // the worker's heartbeats tell that it is not there any more
-    unread_.note("a result of worker {:016x} was dropped: {} are unread", result.worker(), results_.size());
-    return;
+  answers_[results.worker()] = origin.sequence;  // also of those for others: they are numbered together
+  if (results.client() != client_) return;
+  ++traffic_.answers;
+  traffic_.samples_back += results.results().size();
+  for (msg::AssignmentResult& result : results.results()) {
+    if (results_.size() >= limits::kUnreadResults) {  // the worker's heartbeats tell that it is not there any more
+      unread_.note("a result of worker {:016x} was dropped: {} are unread", results.worker(), results_.size());
+      break;
+    }
+    results_.push_back({.worker = results.worker(), .result = std::move(result), .at = now});
   }
-  results_.push_back({std::move(result), now});
   kick();
 }
 
 void RemotePool::take_in(const msg::WorkerHeartbeat& heartbeat, std::uint64_t writer) {
   const std::lock_guard lock(mutex_);
   if (!admit(heartbeat.worker(), writer)) return;
-  Heartbeat news{.name = common::shown(heartbeat.name(), limits::kShown),
-                 .host = common::shown(heartbeat.host(), limits::kShown),
-                 .pid = heartbeat.pid(),
-                 .capacity = heartbeat.capacity()};
+  ++traffic_.heartbeats;
+  Heartbeat news{
+      .name = common::shown(heartbeat.name(), limits::kShown),
+      .host = common::shown(heartbeat.host(), limits::kShown),
+      .pid = heartbeat.pid(),
+      .capacity = heartbeat.capacity(),
+      .period = std::clamp(std::chrono::milliseconds(heartbeat.period()), kHeartbeatPeriod, kLongestHeartbeatPeriod),
+      .answers = heartbeat.answers()};
   for (const msg::ClientLoad& load : heartbeat.clients()) {
     if (load.client() == client_) {
       news.hears_us = true;
       news.samples = load.samples();
+      news.received = TimePoint{std::chrono::nanoseconds(load.received())};
     } else {
       news.others += load.samples();
     }
@@ -301,11 +313,16 @@ void RemotePool::dispatch(std::stop_token stop) {
       const auto owner = participants_.find(worker);
       if (--workers_of_.at(owner->second) == 0) workers_of_.erase(owner->second);
       participants_.erase(owner);
+      answers_.erase(worker);
     }
     if (scheduler_.usable_workers(now) > 0) last_usable_ = now;
     give_up_without_workers(now);
     watch_progress(now);
     prepare_assignments(now);
+    if (const auto period = scheduler_.period_to_ask(now)) {
+      outgoing_.controls.push_back(control(client_, 0, ControlKind::kHeartbeats));
+      outgoing_.controls.back().period(static_cast<std::uint32_t>(period->count()));
+    }
     const Outgoing outgoing = std::exchange(outgoing_, {});
 
     lock.unlock();
@@ -354,7 +371,10 @@ void RemotePool::absorb_heartbeats(TimePoint now, std::vector<WorkerId>& strange
                       .capacity = static_cast<int>(std::min<std::uint32_t>(heartbeat.capacity, INT32_MAX)),
                       .ready = heartbeat.hears_us && connected && writer->second.matched() > 0,
                       .samples = heartbeat.samples,
-                      .others = heartbeat.others},
+                      .others = heartbeat.others,
+                      .received = heartbeat.received,
+                      .all_answers_here = answers_[worker] >= heartbeat.answers,
+                      .period = heartbeat.period},
                      now);
     ever_heard_ = true;
     changed_.notify_all();
@@ -370,9 +390,9 @@ void RemotePool::trace(const Received& received, bool first) const {
   const auto seconds = [](std::int64_t nanoseconds) { return 1e-9 * static_cast<double>(nanoseconds); };
   const msg::AssignmentResult& result = received.result;
   options_.on_sample({.client = client_,
-                      .worker = result.worker(),
+                      .worker = received.worker,
                       .epoch = result.epoch(),
-                      .worker_name = scheduler_.name_of(result.worker()),
+                      .worker_name = scheduler_.name_of(received.worker),
                       .thread = result.thread(),
                       .sample = result.sample(),
                       .attempt = result.attempt(),
@@ -388,13 +408,13 @@ void RemotePool::absorb(Received received, TimePoint now) {
   msg::AssignmentResult& result = received.result;
   const auto found = active_.find(result.epoch());
   if (found == active_.end()) {
-    scheduler_.accept(result.worker(), result.epoch(), result.sample(), 0, now);  // late: counted
+    scheduler_.accept(received.worker, result.epoch(), result.sample(), 0, now);  // late: counted
     if (result.error().empty()) trace(received, false);
     return;
   }
   const std::shared_ptr<Active> active = found->second;
   const bool refused = !result.error().empty();
-  const WorkerId worker = result.worker();
+  const WorkerId worker = received.worker;
   auto outcome_result = wire::from_wire(std::move(result));  // its numbers stay readable
   if (refused) {
     const Error& error = outcome_result.error();
@@ -404,12 +424,15 @@ void RemotePool::absorb(Received received, TimePoint now) {
     return finish(*active, Error{error.code, fmt::format("worker {:016x}: {}", worker, why)});
   }
   if (!outcome_result || !fits(active->batch, *outcome_result)) {
-    return miss(*active, result.worker(),
-                outcome_result ? "its result does not fit the batch" : outcome_result.error().message, now);
+    return miss(*active, worker, outcome_result ? "its result does not fit the batch" : outcome_result.error().message,
+                now);
   }
-  const bool first = scheduler_.accept(result.worker(), result.epoch(), result.sample(), result.engine_steps(), now,
-                                       std::chrono::duration<double>(1e-9 * (static_cast<double>(result.finished()) -
-                                                                             static_cast<double>(result.started()))));
+  const auto between = [](std::int64_t from, std::int64_t to) {
+    return std::chrono::duration<double>(1e-9 * (static_cast<double>(to) - static_cast<double>(from)));
+  };
+  const bool first = scheduler_.accept(
+      worker, result.epoch(), result.sample(), result.engine_steps(), now,
+      {.ran = between(result.started(), result.finished()), .there = between(result.arrived(), result.finished())});
   trace(received, first);
   if (!first) return;
   active->progress = now;
@@ -459,6 +482,8 @@ void RemotePool::prepare_assignments(TimePoint now) {
     message.first_success(active.first_success);
     message.samples(assignment.samples);
     message.sent(std::chrono::nanoseconds(now.time_since_epoch()).count());
+    ++traffic_.assignments;
+    traffic_.samples_out += assignment.samples.size();
     outgoing_.assignments.emplace_back(assignment.worker, std::move(message));
   }
 }
@@ -466,6 +491,11 @@ void RemotePool::prepare_assignments(TimePoint now) {
 physics_pool::PoolStatus RemotePool::status() const {
   const std::lock_guard lock(mutex_);
   return scheduler_.status();
+}
+
+Traffic RemotePool::traffic() const {
+  const std::lock_guard lock(mutex_);
+  return traffic_;
 }
 
 bool RemotePool::wait_for_workers(int count, TimePoint deadline) const {

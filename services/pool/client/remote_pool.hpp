@@ -34,6 +34,13 @@ struct RemotePoolOptions {
   std::function<void(const std::string&)> on_trouble;
 };
 
+/// Messages that a RemotePool exchanged with its workers so far, and the samples in them.
+struct Traffic {
+  std::uint64_t assignments = 0, samples_out = 0;
+  std::uint64_t answers = 0, samples_back = 0;
+  std::uint64_t heartbeats = 0;
+};
+
 /// A RemotePool uses worker processes in one DDS domain. It simulates nothing itself; the
 /// README of this room describes the exchange.
 ///
@@ -54,6 +61,7 @@ class RemotePool final : public physics_pool::AsyncPool {
   Result<Hash> load(const physics_pool::Scene& scene) override;
   Result<std::unique_ptr<Ticket>> submit(const physics_pool::RolloutBatch& batch, OnReply on_reply) override;
   physics_pool::PoolStatus status() const override;
+  Traffic traffic() const;
 
   /// Whether `count` workers could be used by the deadline.
   bool wait_for_workers(int count, physics_pool::TimePoint deadline) const;
@@ -64,6 +72,7 @@ class RemotePool final : public physics_pool::AsyncPool {
   using Control = jostle_msgs::msg::BatchControl;
   using AssignmentMessage = jostle_msgs::msg::Assignment;
   struct Received {
+    WorkerId worker = 0;
     jostle_msgs::msg::AssignmentResult result;
     physics_pool::TimePoint at;
   };
@@ -75,6 +84,9 @@ class RemotePool final : public physics_pool::AsyncPool {
     bool hears_us = false;
     std::uint32_t samples = 0;  // ours
     std::uint64_t others = 0;
+    physics_pool::TimePoint received;  // the newest of our assignments that came there was sent then
+    std::chrono::milliseconds period{0};
+    std::uint64_t answers = 0;  // messages with results that it had sent to anybody
   };
   /// What leaves in one turn of the dispatcher.
   struct Outgoing {
@@ -88,7 +100,7 @@ class RemotePool final : public physics_pool::AsyncPool {
   std::string last_trouble() const;
   bool admit(WorkerId worker, std::uint64_t writer);
   void take_in(const jostle_msgs::msg::WorkerHeartbeat& heartbeat, std::uint64_t writer);
-  void take_in(jostle_msgs::msg::AssignmentResult&& result, std::uint64_t writer);
+  void take_in(jostle_msgs::msg::AssignmentResults&& results, const wire::Origin& origin);
   void miss(Active& active, WorkerId worker, const std::string& why, physics_pool::TimePoint now);
 
   void dispatch(std::stop_token stop);
@@ -116,10 +128,12 @@ class RemotePool final : public physics_pool::AsyncPool {
   std::unordered_map<Hash, std::pair<StateLayout, double>> worlds_;  // layouts and time steps, s
   std::map<Epoch, std::shared_ptr<Active>> active_;                  // shared with its ticket
   std::vector<Received> results_;
+  std::map<WorkerId, std::uint64_t> answers_;        // the newest message with results that came from each
   std::map<WorkerId, Heartbeat> heartbeats_;         // not looked at yet
   std::map<WorkerId, std::uint64_t> participants_;   // that workers are of
   std::map<std::uint64_t, std::size_t> workers_of_;  // by participant
   Outgoing outgoing_;
+  Traffic traffic_;
   physics_pool::TimePoint last_usable_;
   std::string last_refusal_;
   bool ever_heard_ = false;
@@ -134,7 +148,7 @@ class RemotePool final : public physics_pool::AsyncPool {
   wire::Writer<Control> control_writer_;
   std::map<WorkerId, wire::Writer<AssignmentMessage>> assignment_writers_;  // used by the dispatcher alone
   // Readers and the dispatcher use all of the above: last made, first gone.
-  wire::Reader<jostle_msgs::msg::AssignmentResult> result_reader_;
+  wire::Reader<jostle_msgs::msg::AssignmentResults> result_reader_;
   wire::Reader<jostle_msgs::msg::WorkerHeartbeat> heartbeat_reader_;
   std::jthread dispatcher_;
 };

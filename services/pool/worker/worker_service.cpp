@@ -13,7 +13,6 @@
 #include "services/common/process/program.hpp"
 #include "services/common/process/random_id.hpp"
 #include "services/common/results/results.hpp"
-#include "services/pool/protocol.hpp"
 #include "services/wire/convert/pool.hpp"
 #include "services/wire/limits.hpp"
 
@@ -97,10 +96,12 @@ WorkerService::WorkerService(const wire::Participant& participant, const WorkerO
                            take_in(std::move(assignment), origin.participant);
                          }),
       server_([this](std::stop_token stop) { serve(stop); }),
+      poster_([this](std::stop_token stop) { send_results(stop); }),
       heart_([this](std::stop_token stop) { beat(stop); }) {}
 
 WorkerService::~WorkerService() {
   server_ = {};
+  poster_ = {};
   heart_ = {};
   const std::lock_guard lock(mutex_);
   for (const auto& [batch, running] : running_) running.run->signals.cancel();
@@ -116,6 +117,7 @@ void WorkerService::take_in(Assignment&& assignment, std::uint64_t writer) {
   const std::size_t bytes = bytes_of(assignment);
   const std::lock_guard lock(mutex_);
   Account& account = accounts_[writer];
+  account.received = std::max(account.received, assignment.sent());
   if (const char* what = why_too_much(account, assignment, bytes)) {
     ++refused_;
     too_many_.note("{}: an assignment of client {:016x} was dropped: it has too many {} here; it may send it again",
@@ -225,15 +227,19 @@ void WorkerService::accept(Arrival& arrival, WorldPtr world) {
 void WorkerService::refuse(const Arrival& arrival, const Error& error) {
   const Assignment& assignment = arrival.assignment;
   msg::AssignmentResult result;
-  result.client(assignment.client());
-  result.worker(id_);
   result.epoch(assignment.epoch());
   result.attempt(assignment.attempt());
   result.sample(assignment.samples().empty() ? assignment.batch().first_sample() : assignment.samples().front());
   result.error(error.message);
   result.error_code(static_cast<std::uint8_t>(error.code));
-  if (!result_writer_.write(result)) note_lost_result();
+  msg::AssignmentResults answer;
+  answer.client(assignment.client());
+  answer.worker(id_);
+  answer.results().push_back(std::move(result));
+  const bool taken = result_writer_.write(answer);
+  if (!taken) note_lost_result();
   const std::lock_guard lock(mutex_);
+  answers_ += taken ? 1 : 0;
   looked_at(arrival);
   accounts_.at(assignment.client()).samples -= static_cast<std::uint32_t>(assignment.samples().size());
 }
@@ -273,8 +279,6 @@ void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, 
   lock.unlock();
   if (!skipped) {
     msg::AssignmentResult result = wire::to_wire(outcome);
-    result.client(batch.first);
-    result.worker(id_);
     result.epoch(batch.second);
     result.attempt(held.attempt);
     result.sent(held.sent);
@@ -282,17 +286,61 @@ void WorkerService::finish(const BatchId& batch, const RolloutOutcome& outcome, 
     result.started(nanoseconds(shift.started));
     result.finished(nanoseconds(shift.finished));
     result.thread(static_cast<std::uint32_t>(shift.thread));
-    if (!result_writer_.write(result)) note_lost_result();
+    lock.lock();
+    const std::size_t others = accounts_.at(batch.first).samples - outbox_.held(batch.first) - 1;
+    const Left left = others == 0                                    ? Left::kNothing
+                      : others <= static_cast<std::size_t>(threads_) ? Left::kRunning
+                                                                     : Left::kWaiting;
+    if (outbox_.put(batch.first, std::move(result), left, gathering_time(accounts_.at(batch.first).period),
+                    std::chrono::steady_clock::now()))
+      post(lock);
+  } else {
+    lock.lock();
+    --accounts_.at(batch.first).samples;
   }
-  lock.lock();
-  Account& account = accounts_.at(batch.first);
-  --account.samples;  // after the answer: a client may trust "nothing of yours is here"
-  ++account.rollouts;
+  ++accounts_.at(batch.first).rollouts;
   ++rollouts_;
   engine_steps_ += outcome.engine_steps;
   turns_.done(held.job, shift.finished - shift.started, skipped);
   --dealt_;
   feed();
+}
+
+// Sends what has to leave now, and has the rest sent when it is time.
+void WorkerService::post(std::unique_lock<std::mutex>& lock) {
+  std::vector<Outbox::Group> groups = outbox_.take(std::chrono::steady_clock::now());
+  if (groups.empty()) return post_.notify_one();
+  lock.unlock();
+  send(std::move(groups));
+  lock.lock();
+}
+
+void WorkerService::send(std::vector<Outbox::Group> groups) {
+  for (Outbox::Group& group : groups) {
+    const auto samples = static_cast<std::uint32_t>(group.results.size());
+    msg::AssignmentResults answer;
+    answer.client(group.client);
+    answer.worker(id_);
+    answer.results(std::move(group.results));
+    const bool taken = result_writer_.write(answer);
+    if (!taken) note_lost_result();
+    const std::lock_guard lock(mutex_);
+    answers_ += taken ? 1 : 0;
+    accounts_.at(group.client).samples -= samples;  // after the answer: a client may trust "nothing of yours is here"
+  }
+}
+
+void WorkerService::send_results(std::stop_token stop) {
+  std::unique_lock lock(mutex_);
+  while (!stop.stop_requested()) {
+    const auto due = outbox_.due();
+    const auto is_sooner = [&] { return outbox_.due() != due; };
+    due ? post_.wait_until(lock, stop, *due, is_sooner) : post_.wait(lock, stop, is_sooner);
+    std::vector<Outbox::Group> groups = outbox_.take(std::chrono::steady_clock::now());
+    lock.unlock();
+    send(std::move(groups));
+    lock.lock();
+  }
 }
 
 // Takes out a sample that no longer waits or runs.
@@ -315,6 +363,11 @@ void WorkerService::obey(const msg::BatchControl& control, std::uint64_t writer)
     return;
   }
   const std::lock_guard lock(mutex_);
+  if (control.kind() == static_cast<std::uint8_t>(ControlKind::kHeartbeats)) {
+    accounts_[writer].period =
+        std::clamp(std::chrono::milliseconds(control.period()), kHeartbeatPeriod, kLongestHeartbeatPeriod);
+    return;
+  }
   const BatchId id{control.client(), control.epoch()};
   if (control.kind() == static_cast<std::uint8_t>(ControlKind::kCancel)) return cancel(id);
   const auto running = running_.find(id);
@@ -337,14 +390,24 @@ void WorkerService::cancel(const BatchId& batch) {
   }
 }
 
+// Whoever wants to be told the least often has most workers to listen to.
+std::chrono::milliseconds WorkerService::period() const {
+  std::chrono::milliseconds period = kHeartbeatPeriod;
+  for (const auto& [client, account] : accounts_) period = std::max(period, account.period);
+  return period;
+}
+
 void WorkerService::beat(std::stop_token stop) {
+  std::chrono::milliseconds pause{0};
   do {
     const std::vector<std::uint64_t> clients = result_writer_.matched_participants();
     say_who_is_served(clients);
     drop_lost_clients(clients);
-    (void)heartbeat_writer_.write(heartbeat(clients));  // the next one comes soon; five lost ones make us dead
+    const msg::WorkerHeartbeat message = heartbeat(clients);
+    (void)heartbeat_writer_.write(message);  // the next one comes soon; five lost ones make us dead
     say_troubles();
-  } while (common::pause_until(std::chrono::steady_clock::now() + kHeartbeatPeriod, stop));
+    pause = std::chrono::milliseconds(message.period());
+  } while (common::pause_until(std::chrono::steady_clock::now() + pause, stop));
   say_who_is_served({});
   msg::WorkerHeartbeat leave = heartbeat({});
   leave.capacity(0);
@@ -390,7 +453,10 @@ void WorkerService::drop_lost_clients(const std::vector<std::uint64_t>& clients)
   for (const BatchId& batch : lost) cancel(batch);
   std::erase_if(accounts_, [&](const auto& entry) {
     const Account& account = entry.second;
-    return account.samples == 0 && account.arrivals == 0 && !std::ranges::binary_search(clients, entry.first);
+    const bool gone =
+        account.samples == 0 && account.arrivals == 0 && !std::ranges::binary_search(clients, entry.first);
+    if (gone) outbox_.forget(entry.first);
+    return gone;
   });
 }
 
@@ -410,11 +476,14 @@ msg::WorkerHeartbeat WorkerService::heartbeat(const std::vector<std::uint64_t>& 
   message.engine_steps(engine_steps_);
   message.refused(refused_);
   message.busy(static_cast<std::uint32_t>(dealt_));
+  message.period(static_cast<std::uint32_t>(period().count()));
+  message.answers(answers_);
   for (const std::uint64_t client : clients) {
     msg::ClientLoad served;
     served.client(client);
     const auto found = accounts_.find(client);
     served.samples(found == accounts_.end() ? 0 : found->second.samples);
+    served.received(found == accounts_.end() ? 0 : found->second.received);
     message.clients().push_back(served);
   }
   return message;

@@ -16,6 +16,8 @@
 #include "idl/types/time.hpp"
 #include "physics_pool/local/executor.hpp"
 #include "services/common/process/trouble.hpp"
+#include "services/pool/protocol.hpp"
+#include "services/pool/worker/outbox.hpp"
 #include "services/pool/worker/turns.hpp"
 #include "services/pool/worker/world_store.hpp"
 #include "services/wire/dds/reader.hpp"
@@ -39,7 +41,7 @@ struct WorkerOptions {
 ///
 /// Threads  `threads` that simulate; one that checks assignments, compiles worlds and
 ///          deals samples out; one for heartbeats, so that a worker deep in
-///          physics is still heard.
+///          physics is still heard; one for results that waited for others, as outbox.hpp says.
 /// Failure  a bad assignment is answered with an error that names the field; an assignment
 ///          whose world does not arrive in 5 s likewise. A client that is gone
 ///          has its samples dropped. A result that the middleware does not take is lost
@@ -72,8 +74,10 @@ class WorkerService {
   /// What one client has here.
   struct Account {
     std::string name;           // as a log shows it
-    std::uint32_t samples = 0;  // arrived, waiting, running
-    std::size_t arrivals = 0;   // not looked at yet, or waiting for their worlds
+    std::uint32_t samples = 0;  // arrived, waiting, running, or with results that were not sent
+    std::int64_t received = 0;  // `sent` of its newest assignment, ns
+    std::chrono::milliseconds period = kHeartbeatPeriod;  // that it wants
+    std::size_t arrivals = 0;                             // not looked at yet, or waiting for their worlds
     std::size_t arrival_bytes = 0;
     std::size_t batches = 0;     // of which samples wait or run
     std::uint64_t rollouts = 0;  // done
@@ -104,6 +108,10 @@ class WorkerService {
   void feed();
   void finish(const BatchId& batch, const physics_pool::RolloutOutcome& outcome, const physics_pool::Shift& shift);
   Held release(const BatchId& batch, std::uint32_t sample);
+  void post(std::unique_lock<std::mutex>& lock);
+  void send(std::vector<Outbox::Group> groups);
+  void send_results(std::stop_token stop);
+  std::chrono::milliseconds period() const;
   void obey(const jostle_msgs::msg::BatchControl& control, std::uint64_t writer);
   void cancel(const BatchId& batch);
   void beat(std::stop_token stop);
@@ -121,16 +129,19 @@ class WorkerService {
 
   mutable std::mutex mutex_;           // guards everything down to kicked_
   std::condition_variable_any wake_;   // wakes the serving thread
+  std::condition_variable_any post_;   // wakes the thread that sends results
   std::deque<Arrival> arrivals_;       // not looked at yet
   std::deque<Arrival> without_world_;  // looked at, and waiting for their worlds
   std::size_t arrival_bytes_ = 0;      // of both
   Turns turns_;
+  Outbox outbox_;
   std::map<BatchId, Running> running_;
   std::map<std::uint64_t, Account> accounts_;  // by client
   std::deque<BatchId> cancelled_;              // lately; an assignment may come after its cancellation
   int dealt_ = 0;                              // samples with the executor: one per busy thread
   std::uint64_t rollouts_ = 0;
   std::uint64_t engine_steps_ = 0;
+  std::uint64_t answers_ = 0;  // messages with results that were sent
   std::uint64_t refused_ = 0;  // assignments that came when their client had too much here
   bool kicked_ = false;
 
@@ -139,7 +150,7 @@ class WorkerService {
   common::Trouble too_many_{"assignments were dropped"};
   common::Trouble foreign_{"messages were dropped"};
 
-  wire::Writer<jostle_msgs::msg::AssignmentResult> result_writer_;
+  wire::Writer<jostle_msgs::msg::AssignmentResults> result_writer_;
   wire::Writer<jostle_msgs::msg::WorkerHeartbeat> heartbeat_writer_;
   physics_pool::Executor executor_;
   // Readers and threads use all of the above: last made, first gone.
@@ -147,6 +158,7 @@ class WorkerService {
   wire::Reader<jostle_msgs::msg::BatchControl> control_reader_;
   wire::Reader<Assignment> assignment_reader_;
   std::jthread server_;
+  std::jthread poster_;
   std::jthread heart_;
 };
 

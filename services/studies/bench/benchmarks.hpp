@@ -18,6 +18,9 @@ using Measurements = std::vector<Measurement>;
 struct Settings {
   int repeats = 1;           ///< >= 1
   std::vector<int> workers;  ///< for `scheduling`: numbers of processes, one measurement each
+  std::vector<int> hosts;    ///< for `lanes`: numbers of hosts, one measurement each
+  int lanes = 64;            ///< for `lanes`: threads of the worker on each host
+  int steps = 3;             ///< for `lanes`: control steps of a plan, which assignments carry
   int domain = 0;            ///< DDS domain; nobody else uses it, or the next one
   std::stop_token stop;
   WorkLine* line = nullptr;      ///< where it is shown how far the work has come; never null
@@ -60,6 +63,9 @@ Result<void> measure_scheduling(const Settings& settings);
 
 /// Measures the same with the workers spread over hosts.
 Result<void> measure_hosts_scheduling(const Settings& settings);
+
+/// Measures hosts with one worker process each, whose threads wait instead of simulating.
+Result<void> measure_lanes(const Settings& settings);
 
 /// Measures round trips and throughput between two hosts over a good and a bad link, through a
 /// protected and an unprotected domain, microseconds and MB/s.

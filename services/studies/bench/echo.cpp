@@ -20,7 +20,7 @@ constexpr std::size_t kUnread = 1024;  // answers; windows are smaller
 
 // Type and promise of the pool's own, and nobody else's name.
 const wire::Topic<msg::Assignment> kPing{"rt/bench/ping", kTask};
-const wire::Topic<msg::AssignmentResult> kPong{"rt/bench/pong", kTask};
+const wire::Topic<msg::AssignmentResults> kPong{"rt/bench/pong", kTask};
 
 }  // namespace
 
@@ -48,8 +48,8 @@ Result<void> Echo::meet(Assignment assignment, Helpers& helpers) {
 Result<Echo::Answer> Echo::answer_since(std::uint64_t epoch) {
   const auto deadline = Clock::now() + kLost;
   auto answer = pong_.take(deadline);
-  while (answer && answer->epoch() < epoch) answer = pong_.take(deadline);
-  if (answer) return *std::move(answer);
+  while (answer && answer->results().front().epoch() < epoch) answer = pong_.take(deadline);
+  if (answer) return std::move(answer->results().front());
   return Error{Code::kUnavailable, fmt::format("echo: no answer to ping {} in {} s", epoch, kLost.count())};
 }
 
@@ -92,13 +92,15 @@ int serve_echo(int domain, std::stop_token stop) {
     fmt::print(stderr, "jostle bench: {}\n", participant_result.error().message);
     return common::kExitBroken;
   }
-  wire::Writer<msg::AssignmentResult> pong(*participant_result, kPong);
+  wire::Writer<msg::AssignmentResults> pong(*participant_result, kPong);
   const wire::Reader<msg::Assignment> ping(*participant_result, kPing, [&](const msg::Assignment& assignment) {
     msg::AssignmentResult result = wire::to_wire(empty_outcome(assignment.samples().front()));
-    result.client(assignment.client());
     result.epoch(assignment.epoch());
     if (assignment.batch().want_all_trajectories()) result.trajectory(assignment.batch().nominal());
-    (void)pong.write(result);  // likewise, at the asker's
+    msg::AssignmentResults answer;
+    answer.client(assignment.client());
+    answer.results().push_back(std::move(result));
+    (void)pong.write(answer);  // likewise, at the asker's
   });
   common::wait_for(std::move(stop));
   return common::kExitOk;

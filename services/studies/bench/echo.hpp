@@ -56,7 +56,7 @@ class Echo {
   Result<Answer> answer_since(std::uint64_t epoch);
 
   wire::Writer<Assignment> ping_;
-  wire::Inbox<Answer> pong_;
+  wire::Inbox<jostle_msgs::msg::AssignmentResults> pong_;
   std::uint64_t epoch_ = 0;  // of the newest question
 };
 

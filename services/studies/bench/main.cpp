@@ -20,6 +20,7 @@
 #include "services/studies/bench/cheap_physics.hpp"
 #include "services/studies/bench/coarse_grasp.hpp"
 #include "services/studies/bench/first_plan.hpp"
+#include "services/studies/bench/fleet_curve.hpp"
 #include "services/studies/bench/pool_timeline.hpp"
 #include "services/studies/bench/record.hpp"
 #include "services/studies/bench/tags.hpp"
@@ -141,6 +142,27 @@ class RatioOfWorkers final : public Ratio {
         ->capture_default_str()
         ->delimiter(',')
         ->check(CLI::Range(1, 1024));
+    Ratio::add_options(app);
+  }
+};
+
+/// The same for several numbers of hosts with a worker of many threads each.
+class RatioOfLanes final : public Ratio {
+ public:
+  using Ratio::Ratio;
+
+  void add_options(CLI::App& app) override {
+    settings_.hosts = {1, 4, 16};
+    app.add_option("--hosts", settings_.hosts, "Hosts with a worker process each, such as 1,4,16: one measurement each")
+        ->capture_default_str()
+        ->delimiter(',')
+        ->check(CLI::Range(1, 200));
+    app.add_option("--lanes", settings_.lanes, "Threads of each worker")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--steps", settings_.steps, "Control steps of the plan that assignments carry")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1000));
     Ratio::add_options(app);
   }
 };
@@ -279,6 +301,51 @@ class CoarseGrasp final : public Benchmark {
 
  private:
   CoarseGraspOptions options_;
+};
+
+class FleetCurve final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    FleetOptions& fleet = options_.fleet;
+    app.add_option("--hosts", fleet.hosts, "Hosts of the largest fleet, with a worker process each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--lanes", fleet.lanes, "Threads of each worker")->capture_default_str()->check(CLI::Range(1, 1024));
+    app.add_option("--sample", fleet.sample, "Seconds that a sample takes")
+        ->capture_default_str()
+        ->check(CLI::Range(1e-4, 100.0));
+    app.add_option("--samples", fleet.samples_per_lane, "Samples per lane, of one batch")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    app.add_option("--deaths", fleet.deaths_per_minute, "Share of the hosts that die in a minute")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1.0));
+    app.add_option("--measured", options_.measured, "What `jostle bench lanes --json` wrote, to be simulated as well");
+    common::add_seed_option(app, "--seed", fleet.seed, "Seed of latencies and deaths");
+    add_json(app);
+    app.add_option("--plot", plot_, "File for a picture of efficiency over lanes: .png, .svg or .pdf");
+  }
+
+  Result<void> check() const override {
+    if (auto ok = check_picture(plot_); !ok) return ok;
+    return Benchmark::check();
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.picture = plot_;
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_fleet(options_));
+  }
+
+  const char* unit() const override { return "fleets"; }
+
+ private:
+  FleetCurveOptions options_;
+  std::string plot_;
 };
 
 class PoolTimeline final : public Benchmark {
@@ -430,10 +497,14 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
       "coarse physics of a grasp beside the engine: price, ranking, successes found", "15 min", kNothing);
   add(std::type_identity<FirstPlan>(), "first-plan",
       "first plans and re-plans of grasps in fresh worlds, without and with guidance", "an hour", kNothing);
+  add(std::type_identity<FleetCurve>(), "fleet",
+      "simulated: efficiency from one lane to thousands on many hosts, some of which die", "2 min", kNothing);
   add(ratio, "hosts", "between two hosts: round trip and throughput, protected against unprotected", "5 min", kDomain,
       9, measure_hosts);
   add(of_workers, "hosts-scheduling", "waiting workers on several hosts against workers that never idle", "1 min",
       kDomain, 5, measure_hosts_scheduling);
+  add(std::type_identity<RatioOfLanes>(), "lanes",
+      "waiting threads of one worker per host against threads that never idle", "1 min", kDomain, 5, measure_lanes);
   add(ratio, "parareal", "Parareal on all processors against what Eq. 6.4 allows", "15 s", kNothing, 15,
       measure_parareal);
   add(ratio, "parareal-scheduling", "Parareal on 4 to 32 waiting workers against Eq. 6.4", "1 min", kDomain, 9,

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <fstream>
 
 #include "services/common/process/files.hpp"
 
@@ -93,6 +94,16 @@ double Helpers::cpu_seconds() const {
   return sum;
 }
 
+double Helpers::memory() const {
+  double sum = 0.0;
+  for (const Helper& helper : helpers_) {
+    std::ifstream statm(fmt::format("/proc/{}/statm", helper.process.pid()));
+    double all = 0.0, resident = 0.0, shared = 0.0;  // pages
+    if (statm >> all >> resident >> shared) sum += (resident - shared) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  }
+  return sum;
+}
+
 Swarm::Swarm(const wire::Participant& participant, const SwarmOptions& options)
     : helpers_(options.domain, options.core), participant_(participant), pool_(participant_, options.pool) {}
 
@@ -105,6 +116,7 @@ Result<std::unique_ptr<Swarm>> Swarm::start(const SwarmOptions& options) {
   for (int i = 0; i < options.workers; ++i) {
     std::vector<std::string> arguments{"--name", fmt::format("worker-{}", i), "--die-with-parent",
                                        std::to_string(getpid())};
+    if (options.threads > 1) arguments.insert(arguments.end(), {"--threads", std::to_string(options.threads)});
     if (!options.cores.empty()) {
       arguments.insert(arguments.end(),
                        {"--pin", std::to_string(options.cores[static_cast<std::size_t>(i) % options.cores.size()])});

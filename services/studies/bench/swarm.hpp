@@ -49,6 +49,9 @@ class Helpers {
   /// Returns the CPU time that this process and the helpers have used.
   double cpu_seconds() const;
 
+  /// Returns the memory that the helpers have now and share with nobody, bytes.
+  double memory() const;
+
  private:
   struct Helper {
     std::string program;
@@ -80,7 +83,8 @@ class Pinned {
 };
 
 struct SwarmOptions {
-  int workers = 1;
+  int workers = 1;  ///< processes
+  int threads = 1;  ///< of each
   int domain = 0;
   std::optional<int> core;  ///< the only one the workers run on, if given
   std::vector<int> cores;   ///< without `core`: dealt to the workers in turn, each pinned to its own; empty: not pinned
@@ -90,7 +94,7 @@ struct SwarmOptions {
   std::stop_token stop;
 };
 
-/// A Swarm is workers of one thread each, and a client in the same domain.
+/// A Swarm is workers, and a client in the same domain.
 class Swarm {
  public:
   /// Returns when all workers can be used.

@@ -33,7 +33,7 @@ inline const Topic<msg::GoalResult> kTaskResult{"rt/task/result", kAnswer};
 inline const Topic<msg::WorkerHeartbeat> kPoolWorker{"rt/pool/worker", kState, Scope::kDomain};
 inline const Topic<msg::WorldDescription> kPoolWorld{"rt/pool/world", kCatalogue, Scope::kDomain};
 inline const Topic<msg::BatchControl> kPoolControl{"rt/pool/control", kTask, Scope::kDomain};
-inline const Topic<msg::AssignmentResult> kPoolResult{"rt/pool/result", kTask, Scope::kDomain};
+inline const Topic<msg::AssignmentResults> kPoolResult{"rt/pool/result", kTask, Scope::kDomain};
 
 /// These are for bags that are played.
 inline const Topic<msg::PlayControl> kPlayControl{"rt/play/control", kCommand};

@@ -29,7 +29,7 @@ const bags::BagInfo kRun = bag_of(
     {typed("/joint_states", "sensor_msgs/msg/JointState", kState), typed("/lab/tf", "tf2_msgs/msg/TFMessage"),
      typed("/map", "nav_msgs/msg/OccupancyGrid", kLatched), typed("/notes", "std_msgs/msg/String"),
      typed("/play/status", "jostle_msgs/msg/PlayStatus", kLatched),
-     typed("/pool/result", "jostle_msgs/msg/AssignmentResult"),
+     typed("/pool/result", "jostle_msgs/msg/AssignmentResults"),
      typed("/robot/command", "jostle_msgs/msg/VelocityCommand", kCommand),
      typed("/robot/status", "jostle_msgs/msg/RobotStatus", kState),
      typed("/task/goal", "jostle_msgs/msg/Goal", kCommand), typed("/task/plan", "jostle_msgs/msg/Plan", kCommand)});

@@ -21,7 +21,16 @@ constexpr Epoch kBatch = 10, kOther = 11;
 class SchedulerTest : public ::testing::Test {
  protected:
   void hear(WorkerId worker, int capacity = 1, std::uint32_t samples = 0) {
-    sut.heard({.worker = worker, .name = "w", .capacity = capacity, .ready = true, .samples = samples}, now);
+    sut.heard({.worker = worker, .name = "w", .capacity = capacity, .ready = true, .samples = samples, .received = now},
+              now);
+  }
+
+  // Time in which we listen, and hear nobody.
+  void pass(std::chrono::milliseconds time) {
+    for (const TimePoint end = now + time; now < end;) {
+      now = std::min(now + 20ms, end);
+      forgotten = sut.check_silence(now);
+    }
   }
 
   // Samples handed to a worker now.
@@ -36,6 +45,7 @@ class SchedulerTest : public ::testing::Test {
 
   bool accept(WorkerId worker, std::uint32_t sample) { return sut.accept(worker, kBatch, sample, 100, now); }
 
+  std::vector<WorkerId> forgotten;  // in the last turn that passed
   const SchedulerOptions options;
   Scheduler sut{options};
   TimePoint now = TimePoint{} + 1h;
@@ -75,9 +85,8 @@ TEST_F(SchedulerTest, ReissuesTheSamplesOfASilentWorker) {
   sut.start(kBatch, 0, 2);
   EXPECT_THAT(assigned_to(kAnna), ElementsAre(0, 1));
 
-  now += options.silence + 1ms;
+  pass(options.silence + 1ms);
   hear(kBert);
-  sut.check_silence(now);
 
   EXPECT_FALSE(sut.status().workers[0].alive);
   EXPECT_THAT(assigned_to(kBert), ElementsAre(0, 1));
@@ -88,15 +97,118 @@ TEST_F(SchedulerTest, ResultOfTheDeadCountsWhenItIsTheFirst) {
   hear(kAnna);
   sut.start(kBatch, 0, 1);
   sut.assign(now);
-  now += options.silence + 1ms;
+  pass(options.silence + 1ms);
   hear(kBert);
-  sut.check_silence(now);
   sut.assign(now);
 
   EXPECT_TRUE(accept(kAnna, 0));
   EXPECT_FALSE(accept(kBert, 0));
   EXPECT_EQ(sut.status().duplicates, 1u);
   EXPECT_EQ(sut.missing(kBatch), 0u);
+}
+
+TEST_F(SchedulerTest, TimeInWhichWeDidNothingIsNobodysSilence) {
+  hear(kAnna);
+  sut.start(kBatch, 0, 1);
+  sut.assign(now);
+
+  for (int i = 0; i < 3; ++i) {
+    now += 10s;
+    sut.check_silence(now);
+  }
+
+  EXPECT_TRUE(sut.status().workers[0].alive);
+  pass(options.silence);
+  EXPECT_FALSE(sut.status().workers[0].alive);
+}
+
+TEST_F(SchedulerTest, SilenceIsMeasuredByWhatAWorkerPromises) {
+  sut.heard({.worker = kAnna, .capacity = 1, .ready = true, .period = 400ms}, now);
+  pass(1900ms);
+  EXPECT_TRUE(sut.status().workers[0].alive);
+  pass(200ms);
+  EXPECT_FALSE(sut.status().workers[0].alive);
+}
+
+TEST_F(SchedulerTest, SilenceLastsLongerWhereHeartbeatsComeLate) {
+  for (int i = 0; i < 50; ++i) {
+    pass(400ms);
+    hear(kAnna);
+  }
+  pass(4 * options.silence - 200ms);
+  EXPECT_TRUE(sut.status().workers[0].alive);
+  pass(400ms);
+  EXPECT_FALSE(sut.status().workers[0].alive);
+}
+
+TEST_F(SchedulerTest, SamplesOfTheSilentWaitUntilNothingElseIsThere) {
+  hear(kAnna);
+  sut.start(kBatch, 0, 5);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(0, 1));
+  pass(options.silence + 1ms);
+  hear(kBert);
+
+  EXPECT_THAT(assigned_to(kBert), ElementsAre(2, 3));
+  accept(kBert, 2);
+  accept(kBert, 3);
+
+  EXPECT_THAT(assigned_to(kBert), ElementsAre(4, 0));
+  EXPECT_EQ(sut.status().reissued, 1u);
+}
+
+TEST_F(SchedulerTest, WhoIsHeardAgainKeepsWhatNobodyElseWasGiven) {
+  hear(kAnna);
+  sut.start(kBatch, 0, 5);
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(0, 1));
+  pass(options.silence + 1ms);
+  hear(kBert);
+  EXPECT_THAT(assigned_to(kBert), ElementsAre(2, 3));
+
+  hear(kAnna, 1, 2);
+  accept(kBert, 2);
+  accept(kBert, 3);
+
+  EXPECT_THAT(assigned_to(kBert), ElementsAre(4));
+  EXPECT_EQ(sut.status().reissued, 0u);
+  EXPECT_TRUE(accept(kAnna, 0));
+  EXPECT_TRUE(accept(kAnna, 1));
+}
+
+TEST_F(SchedulerTest, SilenceLastsLongerTheMoreOfTheDeadLive) {
+  hear(kAnna);
+  sut.start(kBatch, 0, 200);
+  for (std::uint32_t round = 0; round < 10; ++round) {  // always silent for a little too long
+    const auto samples = assigned_to(kAnna);
+    pass(options.silence + 20ms);
+    for (const std::uint32_t sample : samples) accept(kAnna, sample);
+    hear(kAnna);
+  }
+  sut.assign(now);
+
+  pass(options.silence + 20ms);
+
+  EXPECT_TRUE(sut.status().workers[0].alive);
+  EXPECT_EQ(sut.status().duplicates, 0u);
+}
+
+TEST_F(SchedulerTest, CrowdIsAskedForFewerHeartbeats) {
+  const auto hear_all = [&](std::chrono::milliseconds period) {
+    for (WorkerId worker = 1; worker <= 256; ++worker) {
+      sut.heard({.worker = worker, .capacity = 1, .ready = true, .period = period}, now);
+    }
+  };
+  hear(kAnna);
+  EXPECT_EQ(sut.period_to_ask(now), std::nullopt);
+  hear_all(100ms);
+  now += 1s;
+
+  EXPECT_EQ(sut.period_to_ask(now), 400ms);
+  EXPECT_EQ(sut.period_to_ask(now), std::nullopt) << "it was said just now";
+  now += 1s;
+  EXPECT_EQ(sut.period_to_ask(now), 400ms) << "nobody heard it";
+  hear_all(400ms);
+  now += 1s;
+  EXPECT_EQ(sut.period_to_ask(now), std::nullopt);
 }
 
 TEST_F(SchedulerTest, TakesLeaveAtOnce) {
@@ -124,6 +236,55 @@ TEST_F(SchedulerTest, ReissuesWhatAWorkerTwiceSaysItDoesNotHave) {
   hear(kAnna);
 
   EXPECT_THAT(assigned_to(kAnna), ElementsAre(0));
+}
+
+TEST_F(SchedulerTest, AssignmentThatIsOnItsWayIsNotLost) {
+  hear(kAnna);
+  const TimePoint before = now;
+  now += 10ms;
+  sut.start(kBatch, 0, 1);
+  sut.assign(now);
+  const auto hear_twice = [&] {
+    for (int i = 0; i < 2; ++i) {
+      pass(100ms);
+      sut.heard({.worker = kAnna, .capacity = 1, .ready = true, .received = before}, now);
+    }
+  };
+  for (int i = 0; i < 10; ++i) hear_twice();
+  EXPECT_THAT(assigned_to(kAnna), IsEmpty());
+
+  for (int i = 0; i < 6; ++i) hear_twice();
+
+  EXPECT_THAT(assigned_to(kAnna), ElementsAre(0)) << "nothing takes that long";
+}
+
+TEST_F(SchedulerTest, SampleWhoseResultIsOnItsWayIsNotLost) {
+  hear(kAnna);
+  sut.start(kBatch, 0, 1);
+  sut.assign(now);
+  for (int i = 0; i < 20; ++i) {
+    pass(100ms);
+    sut.heard({.worker = kAnna, .capacity = 1, .ready = true, .received = now, .all_answers_here = false}, now);
+  }
+  EXPECT_THAT(assigned_to(kAnna), IsEmpty());
+  EXPECT_TRUE(accept(kAnna, 0));
+}
+
+TEST_F(SchedulerTest, WorkerHoldsAsManyMoreAsRunWhileMessagesTravel) {
+  hear(kAnna, 64);
+  sut.start(kBatch, 0, 10'000);
+  EXPECT_THAT(assigned_to(kAnna), SizeIs(65));
+  for (std::uint32_t sample = 0; sample < 300; ++sample) {
+    sut.assign(now);
+    now += 1ms;
+    hear(kAnna, 64, 64);
+  }
+  for (std::uint32_t sample = 0; sample < 64; ++sample) {  // 5 ms of 300 on the way
+    sut.accept(kAnna, kBatch, sample, 100, now, {.ran = 50ms, .there = 295ms});
+  }
+
+  EXPECT_THAT(assigned_to(kAnna), SizeIs(64 + 38 - 1))
+      << "38 of 64 end in twice the way of 5 ms and 10 of gathering; one is there";
 }
 
 TEST_F(SchedulerTest, KeepsWaitingForWhatAWorkerSaysItHas) {
@@ -155,7 +316,7 @@ TEST_F(SchedulerTest, GivesMoreOfShortSamplesWhereOthersTakeTurns) {
   hear(kAnna);
   sut.start(kBatch, 0, 100);
   EXPECT_THAT(assigned_to(kAnna), ElementsAre(0, 1));
-  sut.accept(kAnna, kBatch, 0, 100, now, 1ms);
+  sut.accept(kAnna, kBatch, 0, 100, now, {.ran = 1ms});
   EXPECT_THAT(assigned_to(kAnna), ElementsAre(2)) << "nobody else is there";
 
   sut.heard({.worker = kAnna, .name = "w", .capacity = 1, .ready = true, .samples = 2, .others = 1}, now);
@@ -170,7 +331,7 @@ TEST_F(SchedulerTest, GivesNoMoreOfLongSamplesWhereOthersTakeTurns) {
   sut.heard({.worker = kAnna, .name = "w", .capacity = 2, .ready = true, .others = 5}, now);
   sut.start(kBatch, 0, 100);
   EXPECT_THAT(assigned_to(kAnna), ElementsAre(0, 1, 2));
-  sut.accept(kAnna, kBatch, 0, 100, now, 60ms);
+  sut.accept(kAnna, kBatch, 0, 100, now, {.ran = 60ms});
   EXPECT_THAT(assigned_to(kAnna), ElementsAre(3));
 }
 
@@ -288,9 +449,9 @@ TEST_F(SchedulerTest, BenchedWorkerGetsNothingForAWhile) {
 
 TEST_F(SchedulerTest, ForgetsTheLongDead) {
   hear(kAnna);
-  now += options.remember + 1s;
+  pass(options.remember + 20ms);
 
-  EXPECT_THAT(sut.check_silence(now), ElementsAre(kAnna));
+  EXPECT_THAT(forgotten, ElementsAre(kAnna));
   EXPECT_THAT(sut.status().workers, IsEmpty());
 }
 

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
 #include <regex>
 
 #include "services/wire/dds/topics.hpp"
@@ -87,6 +89,50 @@ TEST(Documents, LeadWhereTheySay) {
       EXPECT_THAT(anchors(contents(target)), ::testing::Contains(anchor)) << file << " links to " << path;
     }
   }
+}
+
+// All numbers of a result, in its own units and as per cent or thousandths of them; those of single runs left out.
+std::vector<double> numbers_of(const nlohmann::json& value) {
+  std::vector<double> found;
+  if (value.is_number()) {
+    for (const double unit : {1.0, 100.0, 1000.0}) found.push_back(unit * value.get<double>());
+  }
+  for (const auto& [key, element] : value.items()) {
+    if (!value.is_structured() || key == "provenance" || key == "runs" || key == "values") continue;
+    std::ranges::copy(numbers_of(element), std::back_inserter(found));
+  }
+  return found;
+}
+
+// A table below "<!-- numbers of NAME.json … -->" has, but for its head and first column, no number that is not in one
+// of these files of experiments/results, rounded to the digits that it shows.
+TEST(Documents, TablesHoldTheNumbersOfTheirResults) {
+  static const std::regex mark("<!-- numbers of ([^>]*) -->\\s*\n[^\n]*\n[^\n]*\n((\\|[^\n]*\n)+)"),
+      file(R"(\S+\.json)"), first_cell(R"((^|\n)\|[^|]*\|)"), number(R"(\d[\d,]*\d(\.\d+)?|\d(\.\d+)?)");
+  int tables = 0;
+  for (const auto& document : documents()) {
+    const std::string text = contents(document);
+    for (std::sregex_iterator table(text.begin(), text.end(), mark), end; table != end; ++table) {
+      ++tables;
+      std::vector<double> known;
+      const std::string names = (*table)[1], body = std::regex_replace((*table)[2].str(), first_cell, "$1|");
+      for (std::sregex_iterator name(names.begin(), names.end(), file); name != end; ++name) {
+        const auto json = nlohmann::json::parse(contents(kSource / "experiments" / "results" / name->str()));
+        std::ranges::copy(numbers_of(json), std::back_inserter(known));
+      }
+      for (std::sregex_iterator cell(body.begin(), body.end(), number); cell != end; ++cell) {
+        std::string digits = cell->str();
+        std::erase(digits, ',');
+        const std::size_t point = digits.find('.');
+        const double place = std::pow(10.0, point == std::string::npos ? 0.0 : point + 1.0 - digits.size());
+        const double shown = std::stod(digits);
+        EXPECT_TRUE(std::ranges::any_of(
+            known, [&](double value) { return std::abs(std::abs(value) - shown) <= 0.5000001 * place; }))
+            << document << ": " << cell->str() << " is not in " << names;
+      }
+    }
+  }
+  EXPECT_GE(tables, 3);
 }
 
 }  // namespace

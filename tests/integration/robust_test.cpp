@@ -1,4 +1,5 @@
-// The controllers of Chapter 4: the same decisions on any pool, whatever happens to its workers, and in a replay.
+// The controllers of Chapter 4: the same decisions on any pool and in a replay. They and guided planning: the same
+// plans, whatever happens to workers.
 
 #include <gmock/gmock.h>
 
@@ -7,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "physics_pool/local/thread_pool.hpp"
+#include "planners/guided/guided.hpp"
 #include "planners/robustness/robust_sto.hpp"
 #include "services/pool/client/remote_pool.hpp"
 #include "tests/support/batches.hpp"
@@ -55,13 +57,33 @@ TEST_P(RobustRuns, DecideTheSameOnThreadsOnWorkersAndAgain) {
 INSTANTIATE_TEST_SUITE_P(Controllers, RobustRuns, ::testing::Values("ol", "rol", "cp", "cc", "ocl"),
                          [](const auto& test) { return std::string(test.param); });
 
-// What the controllers plan with: by costs (OL, CC), in the planning world (CP), in several (ROL, OCL).
-struct Weighed {
+// What controllers plan with.
+struct Planning {
   const char* name;
-  int starts, worlds;
+  /// Of the worker that dies, before it does.
+  std::uint64_t rollouts;
+  /// Whether the plan says how robust it is.
+  bool weighs;
+  std::unique_ptr<planners::Planner> (*make)(physics_pool::Pool& pool, const physics_pool::Scene& scene,
+                                             const physics_pool::TaskGeometry& geometry);
 };
 
-class RobustPlans : public ::testing::TestWithParam<Weighed> {
+// By costs (OL, CC), in the planning world (CP), in several (ROL, OCL).
+template <int starts, int worlds>
+std::unique_ptr<planners::Planner> robust(physics_pool::Pool& pool, const physics_pool::Scene& scene,
+                                          const physics_pool::TaskGeometry& geometry) {
+  return std::make_unique<planners::RobustSto>(pool, scene, geometry,
+                                               planners::PbstoOptions{.rollouts = 6, .step_duration = 0.2},
+                                               planners::RobustStoOptions{.starts = starts, .worlds = worlds});
+}
+
+// As `jostle run` grasps.
+std::unique_ptr<planners::Planner> guided(physics_pool::Pool& pool, const physics_pool::Scene& scene,
+                                          const physics_pool::TaskGeometry&) {
+  return planners::GuidedPlanner::make(pool, scene, {}, {.candidates = 30, .judged = 4}).value();
+}
+
+class Plans : public ::testing::TestWithParam<Planning> {
  protected:
   planners::Plan plan_on(physics_pool::Pool& pool) const {
     planners::Problem problem{.world = pool.load(scene).value(), .x0 = physics_pool::initial_state(scene)};
@@ -70,10 +92,7 @@ class RobustPlans : public ::testing::TestWithParam<Weighed> {
     problem.seed = 42;
     problem.objective.success_cost = 0.0;
     const physics_pool::TaskGeometry geometry(scene);
-    const planners::PbstoOptions optimizer{.rollouts = 6, .step_duration = 0.2};
-    planners::RobustSto sut(pool, scene, geometry, optimizer,
-                            {.starts = GetParam().starts, .worlds = GetParam().worlds});
-    auto result = sut.plan(problem, in(kPatience));
+    auto result = GetParam().make(pool, scene, geometry)->plan(problem, in(kPatience));
     if (!result) throw std::runtime_error(result.error().message);
     return std::move(result).value();
   }
@@ -83,7 +102,7 @@ class RobustPlans : public ::testing::TestWithParam<Weighed> {
   std::deque<WorkerProcess> workers;
 };
 
-TEST_P(RobustPlans, AreTheSameWhenAWorkerIsKilledInMidIterationAndReplaced) {
+TEST_P(Plans, AreTheSameWhenAWorkerIsKilledInMidIterationAndReplaced) {
   physics_pool::ThreadPool threads(2);
   const planners::Plan wanted = plan_on(threads);
   const auto participant = wire::Participant::open({.domain = domain}).value();
@@ -95,7 +114,7 @@ TEST_P(RobustPlans, AreTheSameWhenAWorkerIsKilledInMidIterationAndReplaced) {
   const auto name = fmt::format("-{}", workers[0].pid());
   ASSERT_TRUE(eventually(in(kPatience), [&] {
     for (const physics_pool::WorkerStatus& status : remote.status().workers) {
-      if (status.name.ends_with(name) && status.rollouts >= 4) return true;
+      if (status.name.ends_with(name) && status.rollouts >= GetParam().rollouts) return true;
     }
     return false;
   }));
@@ -108,12 +127,14 @@ TEST_P(RobustPlans, AreTheSameWhenAWorkerIsKilledInMidIterationAndReplaced) {
   EXPECT_EQ(got.cost, wanted.cost);
   EXPECT_EQ(got.rollouts, wanted.rollouts);
   EXPECT_EQ(got.robustness, wanted.robustness);
-  EXPECT_EQ(got.robustness.has_value(), GetParam().starts > 0);
+  EXPECT_EQ(got.robustness.has_value(), GetParam().weighs);
 }
 
-INSTANTIATE_TEST_SUITE_P(Planners, RobustPlans,
-                         ::testing::Values(Weighed{"by_cost", 0, 0}, Weighed{"one_world", 3, 0},
-                                           Weighed{"several_worlds", 3, 2}),
+INSTANTIATE_TEST_SUITE_P(Planners, Plans,
+                         ::testing::Values(Planning{"by_cost", 4, false, &robust<0, 0>},
+                                           Planning{"in_one_world", 4, true, &robust<3, 0>},
+                                           Planning{"in_several_worlds", 4, true, &robust<3, 2>},
+                                           Planning{"guided", 2, false, &guided}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

@@ -133,8 +133,8 @@ void add_guidance(std::vector<ParameterKey>& keys) {
   keys.push_back(key(
       "planner.guidance", "", 0, 100'000,
       "Candidates per iteration that coarse physics ranks, and of which the engine judges the few best; for a hand "
-      "that moves in the plane. Rollouts, scales, persistence, update, freezing and screening have no part in it. "
-      "0: Alg. 1 without guidance.",
+      "that moves in the plane. In place of Alg. 1, and then rollouts, scales, persistence, update, freezing and "
+      "screening have no part in it; or to begin a planner of Ch. 4. 0: without guidance.",
       [](auto& p) -> auto& { return p.guidance.candidates; }));
   keys.push_back(key(
       "planner.guidance_generations", "", 1, 100,
@@ -142,7 +142,8 @@ void add_guidance(std::vector<ParameterKey>& keys) {
       [](auto& p) -> auto& { return p.guidance.generations; }));
   keys.push_back(key(
       "planner.guidance_judged", "", 1, 8,
-      "Candidates that the engine judges in the first iteration, side by side; doubled in the next, up to 8.",
+      "Candidates that the engine judges in an iteration, side by side; doubled after each that the engine denied, up to "
+      "8.",
       [](auto& p) -> auto& { return p.guidance.judged; }));
 }
 

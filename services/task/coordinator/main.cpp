@@ -3,9 +3,11 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "services/common/process/cores.hpp"
+#include "services/common/process/domain_claim.hpp"
 #include "services/common/process/program.hpp"
 #include "services/pool/client/remote_pool.hpp"
 #include "services/task/coordinator/coordinator.hpp"
@@ -36,6 +38,13 @@ int main(int argc, char** argv) {
   if (!participant_result) {
     spdlog::error("{}", participant_result.error().message);
     return common::exit_code_of(participant_result.error());
+  }
+  // Two coordinators would both take every goal, and command one robot.
+  const auto claim_result = common::DomainClaim::take("coordinator", participant_result->domain(),
+                                                      std::chrono::seconds(1), participant_result->space());
+  if (!claim_result) {
+    spdlog::error("{}", claim_result.error().message);
+    return common::exit_code_of(claim_result.error());
   }
   spdlog::info("{}, domain {}", common::participant_name(participant_result->id()), participant_result->domain());
   try {

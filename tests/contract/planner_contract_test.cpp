@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "physics_pool/local/thread_pool.hpp"
+#include "planners/guided/guided_start.hpp"
 #include "planners/pbsto/pbsto.hpp"
 #include "planners/robustness/robust_sto.hpp"
 #include "planners/sampling/sampling.hpp"
@@ -80,6 +81,22 @@ std::unique_ptr<Planner> robust_sto(Pool& pool, const Settings& settings, OnProg
   // No final cost is so low: a plan that satisfies it would be done before the suite has seen anything.
   const planners::RobustStoOptions options{.starts = starts, .worlds = 1, .terminal_cost = -1.0};
   return std::make_unique<planners::RobustSto>(pool, scene, geometry, optimizer, options, std::move(on_progress));
+}
+
+// In small_scene(): it has a model of its own, for which a bowl would be no physics.
+std::unique_ptr<planners::GuidedPlanner> guide(Pool& pool, const Settings& settings, OnProgress on_progress) {
+  const PbstoOptions options{.sigma = settings.sigma, .limit = settings.limit, .step_duration = settings.step_duration};
+  return planners::GuidedPlanner::make(pool, small_scene(), options, {.candidates = 30}, std::move(on_progress))
+      .value();
+}
+
+std::unique_ptr<Planner> guided(Pool& pool, const Settings& settings, OnProgress on_progress) {
+  return guide(pool, settings, std::move(on_progress));
+}
+
+std::unique_ptr<Planner> guided_start(Pool& pool, const Settings& settings, OnProgress on_progress) {
+  return std::make_unique<planners::GuidedStart>(guide(pool, settings, {}),
+                                                 robust_sto<0>(pool, settings, std::move(on_progress)));
 }
 
 class PlannerContract : public ::testing::TestWithParam<Implementation> {
@@ -389,6 +406,8 @@ const auto kIcem = ::testing::Values(Implementation{"icem", &sampling<SamplingOp
 const auto kByCost = ::testing::Values(Implementation{"by_cost", &robust_sto<0>});
 const auto kRobust =
     ::testing::Values(Implementation{"by_cost", &robust_sto<0>}, Implementation{"robust", &robust_sto<2>});
+const auto kGuided =
+    ::testing::Values(Implementation{"alone", &guided}, Implementation{"before_another", &guided_start});
 
 INSTANTIATE_TEST_SUITE_P(Pbsto, PlannerContract, kPbsto, kName);
 INSTANTIATE_TEST_SUITE_P(Pbsto, EarlyEndContract, kPbsto, kName);
@@ -407,6 +426,7 @@ INSTANTIATE_TEST_SUITE_P(Icem, EarlyEndContract, kIcem, kName);
 INSTANTIATE_TEST_SUITE_P(Icem, PlannerOnPhysicsContract, kIcem, kName);
 INSTANTIATE_TEST_SUITE_P(RobustSto, PlannerContract, kByCost, kName);
 INSTANTIATE_TEST_SUITE_P(RobustSto, PlannerOnPhysicsContract, kRobust, kName);
+INSTANTIATE_TEST_SUITE_P(Guided, PlannerOnPhysicsContract, kGuided, kName);
 
 }  // namespace
 }  // namespace jostle::tests

@@ -54,8 +54,9 @@ std::unique_ptr<planners::Planner> Composition::make_planner(const planners::OnP
   const Parameters& parameters = parts_.parameters;
   std::unique_ptr<planners::GuidedPlanner> guide;
   if (parameters.guidance.candidates > 0) {
-    auto guide_result =
-        planners::GuidedPlanner::make(*pool_, parts_.belief, parameters.planner, parameters.guidance, on_progress);
+    // Iterations are counted by whoever makes the plan.
+    auto guide_result = planners::GuidedPlanner::make(*pool_, parts_.belief, parameters.planner, parameters.guidance,
+                                                      controller_->planner ? planners::OnProgress{} : on_progress);
     if (guide_result) {
       guide = std::move(guide_result).value();
     } else {

@@ -1,6 +1,5 @@
 #include "physics_pool/local/rollout.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "physics_pool/api/tally.hpp"

@@ -34,9 +34,9 @@ class ThreadPool::Running final : public Ticket {
   // Running samples notice within one engine step; waiting for them keeps the
   // promise that nothing of this batch runs any more.
   ~Running() override {
-    run_->signals.cancel();
     std::unique_lock lock(progress_->mutex);
-    if (!progress_->replied) progress_->on_reply = {};
+    if (!progress_->replied) progress_->on_reply = {};  // before samples end, and with them the batch
+    run_->signals.cancel();
     progress_->done.wait(lock, [&] { return progress_->replied; });
   }
 

@@ -12,8 +12,8 @@ inline constexpr std::chrono::milliseconds kHeartbeatPeriod{100};
 /// The longest that clients may ask for.
 inline constexpr std::chrono::milliseconds kLongestHeartbeatPeriod{1000};
 
-/// How long a result may wait at a worker for others of the same client, by the time between heartbeats that this client
-/// wants: both grow with the number of workers that it listens to.
+/// How long a result may wait at a worker for others of the same client, by the time between heartbeats that this
+/// client wants: both grow with the number of workers that it listens to.
 constexpr std::chrono::nanoseconds gathering_time(std::chrono::milliseconds period) { return period / 10; }
 
 /// The values of BatchControl::kind.

@@ -146,7 +146,8 @@ const char* WorkerService::why_too_much(const Account& account, const Assignment
 void WorkerService::serve(std::stop_token stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    wake_.wait_for(lock, stop, kRetry, [&] { return kicked_; });
+    const auto kicked = [&] { return kicked_; };  // hundreds of idle workers on a machine must not wake up for nothing
+    without_world_.empty() ? wake_.wait(lock, stop, kicked) : wake_.wait_for(lock, stop, kRetry, kicked);
     kicked_ = false;
     std::deque<Arrival> arrivals = std::exchange(without_world_, {});
     std::ranges::move(std::exchange(arrivals_, {}), std::back_inserter(arrivals));

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "services/pool/client/scheduler.hpp"
-#include "services/pool/worker/outbox.hpp"
+#include "services/pool/outbox.hpp"
 
 namespace jostle::studies {
 namespace {

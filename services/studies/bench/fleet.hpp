@@ -16,7 +16,7 @@ struct FleetCosts {
   double assignment = 35e-6;  ///< a message with samples, at the client
   double heartbeat = 25e-6;   ///< at the thread that reads
   double take = 60e-6;        ///< a message with samples, at the worker
-  double sample = 25e-6;      ///< threads that wake up and fall asleep, at the worker
+  double sample = 70e-6;      ///< threads that wake up and fall asleep, at the worker
   double send = 45e-6;        ///< a message with results, at the worker
 };
 

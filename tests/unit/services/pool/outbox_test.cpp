@@ -1,6 +1,6 @@
 // Which results leave together, on a clock that stands still unless told otherwise.
 
-#include "services/pool/worker/outbox.hpp"
+#include "services/pool/outbox.hpp"
 
 #include <gmock/gmock.h>
 

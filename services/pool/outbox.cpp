@@ -1,4 +1,4 @@
-#include "services/pool/worker/outbox.hpp"
+#include "services/pool/outbox.hpp"
 
 #include <algorithm>
 #include <utility>

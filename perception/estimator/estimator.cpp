@@ -11,6 +11,7 @@ namespace jostle::perception {
 namespace {
 
 constexpr std::size_t kMostSteps = 256;  // of a track: a world that stands still may be measured for ever at one time
+constexpr double kGoesOn = 0.15;         // s after it was seen last
 constexpr double kClear = 12.0;          // difference of log weights beyond which a hypothesis is given up
 constexpr double kSame = 0.05;           // squared Mahalanobis distance of hypotheses that have become one
 
@@ -223,10 +224,15 @@ std::vector<Estimate> Estimator::at(double time) const {
   for (const auto& [name, track] : tracks_) {
     if (track.believed < 2) continue;
     State state = track.steps.back().after;
+    // It goes on for a moment; then nobody knows, and it is kept where it was.
+    state.predict(std::min(time, std::max(state.last_seen + kGoesOn, state.time)));
+    const PoseFilter filter = state.likeliest().filter;
+    PoseBelief pose = filter.pose();
+    const bool goes_on = time <= state.time;
+    const Eigen::Vector3d still(0, 0, 0), v = goes_on ? filter.linear() : still;
+    const Eigen::Vector3d w = goes_on ? Eigen::Vector3d(pose.R.conjugate() * filter.angular()) : still;
     state.predict(time);
-    const PoseFilter& filter = state.likeliest().filter;
-    const PoseBelief pose = filter.pose();
-    const Eigen::Vector3d v = filter.linear(), w = pose.R.conjugate() * filter.angular();
+    pose.covariance = state.likeliest().filter.pose().covariance;
     Estimate estimate{.reading = {.name = name,
                                   .position = {pose.p.x(), pose.p.y(), pose.p.z()},
                                   .orientation = {pose.R.w(), pose.R.x(), pose.R.y(), pose.R.z()},
@@ -234,7 +240,7 @@ std::vector<Estimate> Estimator::at(double time) const {
                                   .angular = {w.x(), w.y(), w.z()}},
                       .last_seen = state.last_seen,
                       .seen = time - state.last_seen <= options_.unseen_after,
-                      .rests = filter.rests()};
+                      .rests = filter.rests() || !goes_on};
     Eigen::Map<Matrix6d> covariance(estimate.covariance.data());
     covariance = pose.covariance;
     covariance.diagonal().head<3>().array() += options_.systematic * options_.systematic;

@@ -18,6 +18,7 @@
 #include "services/studies/bench/benchmarks.hpp"
 #include "services/studies/bench/chaos.hpp"
 #include "services/studies/bench/cheap_physics.hpp"
+#include "services/studies/bench/estimator.hpp"
 #include "services/studies/bench/first_plan.hpp"
 #include "services/studies/bench/pool_timeline.hpp"
 #include "services/studies/bench/record.hpp"
@@ -354,6 +355,31 @@ class Tags final : public Benchmark {
   TagsOptions options_;
 };
 
+class EstimatorBenchmark final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--worlds", options_.worlds, "Worlds of each kind of trouble, 20 s each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    common::add_seed_option(app, "--seed", options_.seed, "Of the worlds and of what sensors say of them");
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_estimator(options_));
+  }
+
+  const char* unit() const override { return "worlds"; }
+
+ private:
+  EstimatorBenchOptions options_;
+};
+
 /// The other process of `record`.
 class Publisher final : public Record {
  public:
@@ -391,6 +417,9 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
       measure_coarse_models);
   add(ratio, "early-stop", "a batch that stops its losers against one that does not", "2 min", kNothing, 5,
       measure_early_stop);
+  add(std::type_identity<EstimatorBenchmark>(), "estimator",
+      "the estimate of objects against the last measurement: error, lag, overlaps, under every trouble", "1 min",
+      kNothing);
   add(std::type_identity<FirstPlan>(), "first-plan",
       "first plans and re-plans of grasps in fresh worlds, without and with guidance", "an hour", kNothing);
   add(ratio, "hosts", "between two hosts: round trip and throughput, protected against unprotected", "5 min", kDomain,

@@ -9,6 +9,8 @@
 #include <limits>
 #include <random>
 
+#include "perception/estimator/source_clock.hpp"
+
 namespace jostle::perception {
 namespace {
 
@@ -249,6 +251,33 @@ TEST(Estimator, WhatIsTooLateIsCountedAndLeftOut) {
   ASSERT_TRUE(sut.take(0.5, {sensor.see("can", {0, 0, 0.05})}));
   EXPECT_EQ(sut.counts().late, 1u);
   EXPECT_EQ(sut.at(2.0).at(0).reading.position, before.reading.position);
+}
+
+TEST(SourceClock, ClocksThatAreTwoSecondsApartAreCompared) {
+  Sensor sensor(0.005, 17);
+  SourceClock sut;
+  for (int i = 0; i < 3000; ++i) {
+    const double time = i * kFrame, arrival = time + sensor.between(0.001, 0.1);
+    const double error = sut.to_host(time - 2.0, arrival) - time;
+    EXPECT_GE(error, 0.0);
+    if (i > 100) {
+      EXPECT_LT(error, 0.01);
+    }
+  }
+}
+
+TEST(SourceClock, ClocksThatAgreeAreBelieved) {
+  SourceClock sut;
+  EXPECT_EQ(sut.to_host(5.0, 5.08), 5.0);
+  EXPECT_EQ(sut.to_host(5.1, 5.09), 5.1);
+}
+
+TEST(SourceClock, AClockThatIsSetIsFollowedOnceTheOldMessagesAreForgotten) {
+  SourceClock sut;
+  for (int i = 0; i < 100; ++i) EXPECT_NEAR(sut.to_host(i * 0.1, i * 0.1 + 3.0), i * 0.1 + 3.0, 1e-9);
+  double error = 0;
+  for (int i = 100; i < 300; ++i) error = sut.to_host(i * 0.1, i * 0.1 + 5.0) - (i * 0.1 + 5.0);
+  EXPECT_NEAR(error, 0.0, 1e-9);
 }
 
 // A tag looks nearly the same when it is tilted the other way. That it is the wrong one shows in the long run only.

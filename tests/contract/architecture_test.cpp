@@ -60,6 +60,7 @@ const std::vector<Room> kArrows{
     {"physics_pool/uncertainty/", {"idl/types/", "physics_pool/scene/", "physics_pool/sampling/"}},
     {"physics_pool/scenarios/", {"idl/types/", "physics_pool/scene/", "physics_pool/sampling/"}},
     {"physics_pool/coarse/", {"idl/types/", "idl/files/", "physics_pool/scene/"}},
+    {"physics_pool/feasible/", {"idl/types/", "physics_pool/coarse/", "physics_pool/scene/"}},
     {"physics_pool/parareal/", {"idl/types/", "physics_pool/api/", "physics_pool/coarse/"}},
     {"physics_pool/local/",
      {"idl/types/", "physics_pool/robot/", "physics_pool/scene/", "physics_pool/sampling/", "physics_pool/objective/",

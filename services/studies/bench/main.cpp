@@ -19,6 +19,7 @@
 #include "services/studies/bench/chaos.hpp"
 #include "services/studies/bench/cheap_physics.hpp"
 #include "services/studies/bench/coarse_grasp.hpp"
+#include "services/studies/bench/estimator.hpp"
 #include "services/studies/bench/first_plan.hpp"
 #include "services/studies/bench/fleet_curve.hpp"
 #include "services/studies/bench/pool_timeline.hpp"
@@ -456,6 +457,31 @@ class Tags final : public Benchmark {
   TagsOptions options_;
 };
 
+class EstimatorBenchmark final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--worlds", options_.worlds, "Worlds of each kind of trouble, 20 s each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    common::add_seed_option(app, "--seed", options_.seed, "Of the worlds and of what sensors say of them");
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_estimator(options_));
+  }
+
+  const char* unit() const override { return "worlds"; }
+
+ private:
+  EstimatorBenchOptions options_;
+};
+
 /// The other process of `record`.
 class Publisher final : public Record {
  public:
@@ -495,6 +521,9 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
       measure_early_stop);
   add(std::type_identity<CoarseGrasp>(), "coarse-grasp",
       "coarse physics of a grasp beside the engine: price, ranking, successes found", "15 min", kNothing);
+  add(std::type_identity<EstimatorBenchmark>(), "estimator",
+      "the estimate of objects against the last measurement: error, lag, overlaps, under every trouble", "1 min",
+      kNothing);
   add(std::type_identity<FirstPlan>(), "first-plan",
       "first plans and re-plans of grasps in fresh worlds, without and with guidance", "an hour", kNothing);
   add(std::type_identity<FleetCurve>(), "fleet",

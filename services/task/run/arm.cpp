@@ -61,7 +61,8 @@ std::vector<Part> parts_of_world(const RunOptions& options, const std::filesyste
     if (simulated) seen_by = {"--mocap", host};
     // A simulated world has a clock of its own, which the frames tell.
     const char* stamps = options.arm.kind == Arm::Kind::kSim ? "server" : "host";
-    parts.push_back(part("the eyes", "perceive", {"mocap", "--host", host, "--stamps", stamps}));
+    parts.push_back(
+        part("the eyes", "perceive", {"mocap", "--host", host, "--stamps", stamps, "--scene", belief.string()}));
   }
   const auto simulating = [&](std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), seen_by.begin(), seen_by.end());

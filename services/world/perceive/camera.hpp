@@ -19,10 +19,8 @@ struct CameraOptions {
   std::optional<Pose> X_WC;     ///< where the camera is; nothing: overhead()
 };
 
-/// Publishes where the objects are, once for each image in which a tag is seen, until a stop is requested. An object
-/// that stands (tilted by less than 15 degrees, its height off by less than 2 cm) is put upright on the surface, along
-/// the ray through its tag: what a camera knows least is how far away things are. Errors   those of load_scene() and
-/// tags_of()
+/// Publishes where the objects are, as Sight does, once for each image, until a stop is requested.
+/// Errors   those of load_scene() and tags_of()
 Result<void> look_through_camera(const wire::Participant& participant, const CameraOptions& options,
                                  std::stop_token stop);
 

@@ -1,21 +1,20 @@
 // jostle perceive: what a sensor sees of the objects, as topics.
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
-#include <mutex>
-#include <set>
+#include <optional>
+#include <vector>
 
 #include "perception/natnet/client.hpp"
-#include "perception/tracking/tracker.hpp"
+#include "physics_pool/scene/scene.hpp"
 #include "services/common/process/command_line.hpp"
 #include "services/common/process/program.hpp"
-#include "services/world/link/objects_out.hpp"
 #include "services/world/perceive/camera.hpp"
+#include "services/world/perceive/sight.hpp"
 
 namespace {
 
@@ -25,70 +24,42 @@ namespace natnet = perception::natnet;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kTick = std::chrono::milliseconds(100);
-constexpr auto kUnseen = std::chrono::seconds(1);                // worth a word
-constexpr auto kStandardForms = std::chrono::milliseconds(100);  // between two messages of them
+constexpr double kMarkers = 0.04;  // m, about what markers are from the middle of an object
 
-// Frames in, topics out. Threads: the client's.
-class Sight {
- public:
-  Sight(const wire::Participant& participant, bool by_servers_clock)
-      : by_servers_clock_(by_servers_clock), topics_(participant, kStandardForms) {}
-
-  void look(const natnet::Seen& seen) {
-    const std::chrono::duration<double> exposed = seen.exposed.time_since_epoch();
-    const double time = by_servers_clock_ ? seen.timestamp : exposed.count();
-    for (const natnet::NamedBody& one : seen.bodies) {
-      const auto& p = one.body.position;
-      const auto& q = one.body.orientation;
-      const bool taken =
-          one.body.tracked && tracker_.take(one.name, {p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}, time);
-      note(one.name, taken);
-    }
-    const auto readings = tracker_.readings(time);
-    if (!readings.empty()) topics_.tell(readings, time);
-  }
-
-  // Objects that were not seen for a while.
-  std::set<std::string> unseen() const {
-    const std::lock_guard lock(mutex_);
-    std::set<std::string> names;
-    for (const auto& [name, when] : seen_) {
-      if (Clock::now() - when > kUnseen) names.insert(name);
-    }
-    return names;
-  }
-
- private:
-  void note(const std::string& name, bool taken) {
-    const std::lock_guard lock(mutex_);
-    const auto [found, is_new] = seen_.try_emplace(name);
-    if (taken) found->second = Clock::now();
-  }
-
-  const bool by_servers_clock_;
-  perception::Tracker tracker_;
-  ObjectTopics topics_;
-  mutable std::mutex mutex_;  // guards seen_
-  std::map<std::string, Clock::time_point> seen_;
+struct MocapOptions {
+  natnet::Client::Options client;
+  bool by_servers_clock = false;
+  double noise = 0.0005;  // m
 };
 
+std::vector<perception::Sighting> sightings(const natnet::Seen& seen, double noise) {
+  std::vector<perception::Sighting> sightings;
+  for (const natnet::NamedBody& one : seen.bodies) {
+    if (!one.body.tracked) continue;
+    const auto& p = one.body.position;
+    const auto& q = one.body.orientation;
+    perception::Explanation explanation{
+        .X_WB = {.position = {p[0], p[1], p[2]}, .orientation = {q[0], q[1], q[2], q[3]}}};
+    const double sigma = std::hypot(noise, one.body.mean_error);
+    for (std::size_t i = 0; i < 6; ++i) explanation.covariance[7 * i] = std::pow(i < 3 ? sigma : sigma / kMarkers, 2);
+    sightings.push_back({one.name, {explanation}});
+  }
+  return sightings;
+}
+
 // Says what changes: frames that come or stay away, objects that are lost or found.
-void watch(const natnet::Client& client, const Sight& sight, const std::string& host, std::stop_token stop) {
+void watch(const natnet::Client& client, Sight& sight, const std::string& host, std::stop_token stop) {
   std::string said = "-";
-  std::set<std::string> lost;
   do {
     if (const std::string trouble = client.trouble(); trouble != said) {
       trouble.empty() ? spdlog::info("frames come from {}", host) : spdlog::warn("waiting: {}", trouble);
       said = trouble;
     }
-    if (auto unseen = sight.unseen(); unseen != lost) {
-      unseen.empty() ? spdlog::info("every object is seen")
-                     : spdlog::warn("not seen: {}; kept where they were", fmt::join(unseen, ", "));
-      lost = std::move(unseen);
-    }
+    sight.say_unseen();
   } while (common::pause_until(Clock::now() + kTick, stop));
   const auto counts = client.counts();
   spdlog::info("{} frames, {} lost on the way, {} bad messages", counts.frames, counts.lost, counts.malformed);
+  sight.say_counts();
 }
 
 }  // namespace
@@ -97,20 +68,26 @@ int main(int argc, char** argv) {
   CLI::App app("Publishes what a sensor sees of the objects: /objects/states, /objects/poses, /tf.", "jostle perceive");
   app.require_subcommand(1);
   common::ProcessOptions process;
-  natnet::Client::Options options;
-  std::string stamps = "host";
+  MocapOptions options;
+  std::string stamps = "host", mocap_scene;
   auto* mocap = app.add_subcommand("mocap",
                                    "Motion capture that speaks NatNet 3.0 to 4.1; rigid bodies have the names of "
                                    "the scene's objects, and up is z");
-  mocap->add_option("--host", options.host, "The server's address or name")->capture_default_str();
-  mocap->add_option("--port", options.command_port, "Its command port")->capture_default_str();
-  mocap->add_option("--interface", options.interface,
+  mocap->add_option("--host", options.client.host, "The server's address or name")->capture_default_str();
+  mocap->add_option("--port", options.client.command_port, "Its command port")->capture_default_str();
+  mocap->add_option("--interface", options.client.interface,
                     "IPv4 address of this host on which multicast is heard (default: the system's choice)");
   mocap
       ->add_option("--stamps", stamps,
                    "host: when a frame was exposed, by this host's clock; server: the frames' own timestamps")
       ->capture_default_str()
       ->check(CLI::IsMember({"host", "server"}));
+  mocap->add_option("--scene", mocap_scene,
+                    "Scene file: objects that may well stand are published standing, and none inside another\n"
+                    "(default: as they are estimated)");
+  mocap->add_option("--noise", options.noise, "Standard deviation of a coordinate, m; rotations follow from it")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-5, 1.0));
   common::add_process_options(*mocap, process);
   CameraOptions camera_options;
   std::vector<double> at;
@@ -152,12 +129,22 @@ int main(int argc, char** argv) {
         return fail(ok.error());
       return common::kExitOk;
     }
-    Sight sight(*participant_result, stamps == "server");
-    auto client_result = natnet::Client::start(options, [&](const natnet::Seen& seen) { sight.look(seen); });
+    std::optional<physics_pool::Scene> scene;
+    if (!mocap_scene.empty()) {
+      auto scene_result = physics_pool::load_scene(mocap_scene);
+      if (!scene_result) return fail(scene_result.error());
+      scene = std::move(scene_result).value();
+    }
+    options.by_servers_clock = stamps == "server";
+    Sight sight(*participant_result, std::move(scene));
+    auto client_result = natnet::Client::start(options.client, [&](const natnet::Seen& seen) {
+      const std::chrono::duration<double> exposed = seen.exposed.time_since_epoch();
+      sight.look(options.by_servers_clock ? seen.timestamp : exposed.count(), sightings(seen, options.noise));
+    });
     if (!client_result) return fail(client_result.error());
-    spdlog::info("looking for motion capture at {}:{}, domain {}", options.host, options.command_port,
+    spdlog::info("looking for motion capture at {}:{}, domain {}", options.client.host, options.client.command_port,
                  participant_result->domain());
-    watch(**client_result, sight, options.host, signal.token());
+    watch(**client_result, sight, options.client.host, signal.token());
     return common::kExitOk;
   } catch (const wire::SetupError& error) {
     return fail({Code::kUnavailable, error.what()});

@@ -1,0 +1,104 @@
+// Intrinsics from rendered views of a printed sheet, against the camera that rendered them.
+
+#include "perception/tags/calibration.hpp"
+
+#include <gmock/gmock.h>
+
+#include "tests/support/tag_views.hpp"
+
+namespace jostle::perception {
+namespace {
+
+using namespace tests;
+using testing::HasSubstr;
+
+Page sheet() {
+  std::vector<PrintedTag> tags;
+  for (int i = 0; i < 12; ++i) tags.push_back({.id = i, .size = 0.045, .label = {}});
+  return lay_out(tags)->front();
+}
+
+// X_CB of a sheet whose middle is at (x, y, z), tilted about an axis in its plane.
+Pose sheet_at(double x, double y, double z, double tilt, double about) {
+  const Pose middle{.position = {-0.095, -0.125, 0}};
+  return pose_of(transform(tilted({x, y, z}, tilt, about, 0.1)) * transform(middle));
+}
+
+std::vector<Pose> good_poses() {
+  std::vector<Pose> poses;
+  for (int i = 0; i < 12; ++i)
+    poses.push_back(
+        sheet_at(0.16 * (i % 3 - 1), 0.05 * (i % 2 == 0 ? 1 : -1), 0.42 + 0.02 * (i % 4), 0.55, 2 * M_PI * i / 12));
+  return poses;
+}
+
+std::vector<std::vector<TagView>> views_of(const std::vector<Pose>& poses) {
+  const Camera camera = distorting_camera();
+  const SceneCamera eye(camera);
+  Detector detector;
+  const Page board = sheet();
+  std::vector<std::vector<TagView>> views;
+  for (const Pose& X_CB : poses) {
+    View view;
+    for (const PlacedTag& placed : board) {
+      const double half = placed.tag.size * kTagCells / kTagBorderCells / 2;
+      const Pose X_BT{.position = {placed.x + half, placed.y + half, 0}};
+      view.stickers.push_back({placed.tag.id, placed.tag.size, pose_of(transform(X_CB) * transform(X_BT))});
+    }
+    views.push_back(on_board(detector.detect(eye.render(view, views.size())), board));
+  }
+  return views;
+}
+
+TEST(Calibration, RenderedSheetsGiveTheCameraThatRenderedThem) {
+  const Camera truth = distorting_camera();
+  const auto poses = good_poses();
+  const auto result = calibrate(truth.width, truth.height, views_of(poses));
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_NEAR(result->camera.fx, truth.fx, 0.002 * truth.fx);
+  EXPECT_NEAR(result->camera.fy, truth.fy, 0.002 * truth.fy);
+  EXPECT_NEAR(result->camera.cx, truth.cx, 0.002 * truth.width);
+  EXPECT_NEAR(result->camera.cy, truth.cy, 0.002 * truth.width);
+  EXPECT_NEAR(result->camera.distortion[0], truth.distortion[0], 0.02);
+  EXPECT_LT(result->error_px, 0.2);
+  ASSERT_EQ(result->X_CB.size(), poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_LT(distance_between(result->X_CB[i], poses[i]), 0.001);
+    EXPECT_LT(rotation_between(result->X_CB[i], poses[i]), 0.1 * M_PI / 180);
+  }
+}
+
+TEST(Calibration, TooFewOrTooSimilarViewsAreRefused) {
+  const Camera truth = distorting_camera();
+  const auto complaint = [&](const std::vector<std::vector<TagView>>& views) {
+    const auto result = calibrate(truth.width, truth.height, views);
+    return result ? std::string("nothing") : result.error().message;
+  };
+  const auto perfect = [&](const std::vector<Pose>& poses) {
+    std::vector<std::vector<TagView>> views;
+    for (const Pose& X_CB : poses) {
+      views.emplace_back();
+      for (const PlacedTag& placed : sheet()) {
+        const double half = placed.tag.size * kTagCells / kTagBorderCells / 2;
+        const Pose X_BT{.position = {placed.x + half, placed.y + half, 0}};
+        const Pose X_CT = pose_of(transform(X_CB) * transform(X_BT));
+        views.back().push_back({perfect_corners(truth, X_CT, placed.tag.size), placed.tag.size, X_BT});
+      }
+    }
+    return views;
+  };
+  auto poses = good_poses();
+  EXPECT_EQ(complaint(perfect(poses)), "nothing");
+  poses.resize(7);
+  EXPECT_THAT(complaint(perfect(poses)), HasSubstr("got 7 of 7 with 4 tags or more, wanted at least 8"));
+  poses.clear();
+  for (int i = 0; i < 10; ++i) poses.push_back(sheet_at(0, 0, 0.9, 0.5, i));
+  EXPECT_THAT(complaint(perfect(poses)), HasSubstr("towards the image's borders"));
+  poses.clear();
+  for (int i = 0; i < 10; ++i)
+    poses.push_back(sheet_at(0.16 * (i % 3 - 1), 0.06 * (i % 2 == 0 ? 1 : -1), 0.45, 0.1, i));
+  EXPECT_THAT(complaint(perfect(poses)), HasSubstr("tilted alike"));
+}
+
+}  // namespace
+}  // namespace jostle::perception

@@ -85,7 +85,8 @@ void Scheduler::heard_again(Worker& worker, const WorkerNews& news) {
     ++batch->second.samples[index].copies;
     worker.outstanding.push_back(entry);
   }
-  std::ranges::rotate(worker.outstanding, worker.outstanding.begin() + static_cast<std::ptrdiff_t>(newer));
+  const auto begin = worker.outstanding.begin();
+  std::rotate(begin, begin + static_cast<std::ptrdiff_t>(newer), worker.outstanding.end());  // oldest first
   worker.doubted.clear();
 }
 

@@ -68,7 +68,8 @@ int main(int argc, char** argv) {
     std::optional<robot_bridge::robotiq::Client> client;
     if (gripper == "robotiq") client.emplace(gripper_options);
     robot_bridge::ur::ArmHand hand(arm, client ? &*client : nullptr);
-    ArmBody body(*participant_result, hand, hand, std::chrono::milliseconds(std::lround(1e3 * silence)));
+    ArmBody body(*participant_result, hand, hand, arm_options.mounting,
+                 std::chrono::milliseconds(std::lround(1e3 * silence)));
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience);
     std::string said;
     for (std::string trouble; !(trouble = hand.trouble()).empty();) {

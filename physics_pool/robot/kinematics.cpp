@@ -3,7 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics_pool/robot/joint_motion.hpp"
+
 namespace jostle::physics_pool {
+
+void move(Eigen::Isometry3d& X, const Joint& joint, double value) {
+  const Eigen::Vector3d axis(joint.axis[0], joint.axis[1], joint.axis[2]);
+  if (joint.kind == JointKind::kSlide) {
+    X.translate(Eigen::Vector3d(axis * value));
+  } else {
+    X.rotate(Eigen::AngleAxisd(value, axis));
+  }
+}
 
 Eigen::Isometry3d link_pose(const RobotModel& model, const Eigen::Isometry3d& base, std::span<const double> q,
                             int link) {
@@ -11,14 +22,8 @@ Eigen::Isometry3d link_pose(const RobotModel& model, const Eigen::Isometry3d& ba
   const Link& l = model.links[static_cast<std::size_t>(link)];
   Eigen::Isometry3d X = (l.parent < 0 ? base : link_pose(model, base, q, l.parent)) * transform(l.pose);
   for (const int j : l.joints) {
-    const Joint& joint = model.joints[static_cast<std::size_t>(j)];
-    const Eigen::Vector3d axis(joint.axis[0], joint.axis[1], joint.axis[2]);
-    const double value = q[static_cast<std::size_t>(j)];
-    if (joint.kind == JointKind::kSlide) {
-      X.translate(Eigen::Vector3d(axis * value));
-    } else {
-      X.rotate(Eigen::AngleAxisd(value, axis));
-    }
+    const auto place = static_cast<std::size_t>(j);
+    move(X, model.joints[place], q[place]);
   }
   return X;
 }

@@ -441,6 +441,26 @@ TEST_F(CoordinatorProcess, RefusesASecondGoalWhileBusyAndObeysCancel) {
   EXPECT_TRUE(result_of("third").success());
 }
 
+TEST_F(CoordinatorProcess, StampsItsFeedbackWithTheTimeOfTheWorld) {
+  wire::Inbox<Feedback> feedback{participant, wire::topics::kTaskFeedback, 64};
+  wire::Inbox<Observation> observations{participant, wire::topics::kTaskObservation, 64};
+  Goal moving = goal("moving");
+  moving.plan_only(false);
+
+  EXPECT_TRUE(goals.write(moving));
+  (void)result_of("moving");
+
+  double seen = 0.0, told = -1.0;
+  EXPECT_TRUE(soon(kPatience,
+                   [&] {
+                     for (const Observation& observation : observations.take_all())
+                       seen = world::seconds(observation.header());
+                     for (const Feedback& one : feedback.take_all()) told = world::seconds(one.header());
+                     return seen > 0 && told == seen;
+                   }))
+      << "observed at " << seen << " s, told at " << told << " s";
+}
+
 // What viewers of ROS 2 need: one clock for all stamps, and no transform twice without need.
 TEST_F(WorldLink, TheClockTellsTheTimeOfTheStampsAndTransformsDoNotRepeatThemselves) {
   wire::Inbox<rosgraph_msgs::msg::Clock> clock{participant, wire::topics::kClock, 512};

@@ -11,6 +11,7 @@
 
 #include "services/common/process/program.hpp"
 #include "services/common/process/trouble.hpp"
+#include "services/task/coordinator/markers.hpp"
 #include "services/wire/limits.hpp"
 #include "services/world/link/messages.hpp"
 #include "services/world/link/world_client.hpp"
@@ -187,6 +188,8 @@ Coordinator::Coordinator(const wire::Participant& participant, physics_pool::Asy
       run_writer_(participant, wire::topics::kTaskRun),
       observation_writer_(participant, wire::topics::kTaskObservation),
       plan_writer_(participant, wire::topics::kTaskPlan),
+      scene_marker_writer_(participant, wire::topics::kSceneMarkers),
+      plan_marker_writer_(participant, wire::topics::kPlanMarkers),
       goals_(participant, wire::topics::kTaskGoal, kGoalQueue),
       cancels_(participant, wire::topics::kTaskCancel, [this](const jostle_msgs::msg::Cancel& cancel) {
         const std::lock_guard lock(mutex_);
@@ -282,6 +285,9 @@ Coordinator::Performance Coordinator::perform(const Goal& goal, Task& task, std:
   world::ObjectsClient objects(participant_, robot);
   const std::string goal_text = fmt::format("goal {}: ", shown(goal.goal_id()));
   tell(run_writer_, describe_run(goal), goal_text + "its beginning");
+  // Whoever misses markers sees less, and nothing is decided by them.
+  (void)scene_marker_writer_.write(scene_markers(task.execution_scene()));
+  (void)plan_marker_writer_.write(no_markers());
   Performance performance;
   const Task::Watch watch{
       .on_event =
@@ -293,11 +299,16 @@ Coordinator::Performance Coordinator::perform(const Goal& goal, Task& task, std:
       .journal = {.on_observation =
                       [&](const jostle_msgs::msg::Observation& news) {
                         tell(observation_writer_, news, fmt::format("{}observation {}", goal_text, news.number()));
+                        {
+                          const std::lock_guard lock(mutex_);
+                          world_time_ = world::seconds(news.header());
+                        }
                         performance.seen.push_back(news);
                       },
                   .on_plan =
                       [&](const jostle_msgs::msg::Plan& plan) {
                         tell(plan_writer_, plan, fmt::format("{}plan {}", goal_text, plan.number()));
+                        (void)plan_marker_writer_.write(plan_markers(geometry, plan));
                       }},
       .time = [&] { return robot.time(); }};
   if (auto ended = task.perform(robot, objects, watch, std::move(stop)); !ended) performance.ended = ended.error();
@@ -352,12 +363,11 @@ void Coordinator::publish_feedback(std::stop_token stop) {
     {
       const std::lock_guard lock(mutex_);
       feedback = feedback_;
+      feedback.header(world::make_header(world_time_, ""));
       if (!goal_id_.empty()) {
         feedback.elapsed(std::chrono::duration<double>(steady_clock::now() - started_).count());
       }
     }
-    const std::chrono::duration<double> now = std::chrono::system_clock::now().time_since_epoch();
-    feedback.header(world::make_header(now.count(), ""));
     feedback.trouble(troubles_.text());
     for (const physics_pool::WorkerStatus& worker : pool.workers) {
       jostle_msgs::msg::WorkerReport report;

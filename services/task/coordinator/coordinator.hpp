@@ -12,6 +12,7 @@
 
 #include "physics_pool/api/pool.hpp"
 #include "services/task/session/task.hpp"
+#include "services/wire/dds/display_topics.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/reader.hpp"
 #include "services/wire/dds/topics.hpp"
@@ -43,7 +44,8 @@ class TroubleBoard {
 ///
 /// Feedback goes out several times a second whether there is news or not, so
 /// that silence means death. What decides a task and what it decides goes out as
-/// TaskRun, Observation and Plan: enough to make every decision again.
+/// TaskRun, Observation and Plan: enough to make every decision again. Markers of the goal's scene and of the newest
+/// plan go out for those who look.
 class Coordinator {
  public:
   /// `troubles` is shown in the feedback as long as a task is there.
@@ -73,11 +75,12 @@ class Coordinator {
   physics_pool::AsyncPool& pool_;
   TroubleBoard& troubles_;
 
-  std::mutex mutex_;  // guards feedback_, started_, goal_id_ and cancel_
+  std::mutex mutex_;  // guards all down to cancel_
   jostle_msgs::msg::Feedback feedback_;
   std::chrono::steady_clock::time_point started_;
   std::uint64_t rollouts_before_ = 0;  // those of the plans before the present one
   std::string goal_id_;                // empty: no task
+  double world_time_ = 0.0;            // s, of the newest observation
   std::stop_source cancel_;            // stops the present task
 
   wire::Writer<jostle_msgs::msg::Feedback> feedback_writer_;
@@ -85,6 +88,7 @@ class Coordinator {
   wire::Writer<jostle_msgs::msg::TaskRun> run_writer_;
   wire::Writer<jostle_msgs::msg::Observation> observation_writer_;
   wire::Writer<jostle_msgs::msg::Plan> plan_writer_;
+  wire::Writer<visualization_msgs::msg::MarkerArray> scene_marker_writer_, plan_marker_writer_;
   wire::Inbox<Goal> goals_;
   wire::Reader<jostle_msgs::msg::Cancel> cancels_;
 };

@@ -1,5 +1,6 @@
 #include "services/wire/dds/system_topics.hpp"
 
+#include "services/wire/dds/display_topics.hpp"
 #include "services/wire/dds/topics.hpp"
 
 namespace jostle::wire {
@@ -15,7 +16,8 @@ SystemTopic describe(const Topic<T>& topic) {
 
 const std::vector<SystemTopic>& system_topics() {
   static const std::vector<SystemTopic> table =
-      std::apply([](const auto&... topic) { return std::vector{describe(topic)...}; }, topics::all());
+      std::apply([](const auto&... topic) { return std::vector{describe(topic)...}; },
+                 std::tuple_cat(topics::all(), topics::displayed()));
   return table;
 }
 

@@ -14,8 +14,8 @@ struct SystemTopic : RawTopic {
   Scope scope = Scope::kRobot;
 };
 
-/// Returns the topics of topics.hpp, in its order, by their names without a namespace. Topics of single workers are
-/// not among them.
+/// Returns the topics of topics.hpp and display_topics.hpp, in their order, by their names without a namespace. Topics
+/// of single workers are not among them.
 const std::vector<SystemTopic>& system_topics();
 
 }  // namespace jostle::wire

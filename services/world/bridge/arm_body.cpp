@@ -5,7 +5,8 @@
 #include <thread>
 #include <utility>
 
-#include "services/world/link/messages.hpp"
+#include "physics_pool/robot/robot_yaml.hpp"
+#include "services/world/arm/arm_scene.hpp"
 
 namespace jostle::world {
 namespace {
@@ -14,11 +15,18 @@ constexpr auto kTick = std::chrono::milliseconds(2);  // the fastest controllers
 constexpr const char* kJointNames[] = {"shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
                                        "wrist_1_joint",      "wrist_2_joint",       "wrist_3_joint"};
 
+// The built-in arm, its joints called as UR's own driver for ROS 2 calls them.
+physics_pool::RobotModel arm_model() {
+  physics_pool::RobotModel model = physics_pool::builtin_robot("ur5_2f85").value();
+  for (std::size_t j = 0; j < std::size(kJointNames); ++j) model.joints[j].name = kJointNames[j];
+  return model;
+}
+
 }  // namespace
 
 ArmBody::ArmBody(const wire::Participant& participant, robot_bridge::ur::ArmHand& hand, robot_bridge::Robot& robot,
-                 std::chrono::milliseconds patience)
-    : hand_(hand), robot_(robot), patience_(patience), joints_(participant, wire::topics::kJointStates) {}
+                 const robot_bridge::planar::Mounting& mounting, std::chrono::milliseconds patience)
+    : hand_(hand), robot_(robot), patience_(patience), arm_(participant, arm_model(), pose_of(mounting.base), {}) {}
 
 Result<void> ArmBody::begin(std::span<const double> u, double duration) {
   auto ok = robot_.start(u, duration);
@@ -59,18 +67,16 @@ robot_bridge::RobotReading ArmBody::reading() {
 }
 
 void ArmBody::tell_joints() {
-  const double stamp = reading().stamp;
+  const robot_bridge::RobotReading hand = reading();
   const robot_bridge::ur::ArmState& state = hand_.arm_state();
-  if (state.received == told_) return;
+  if (state.received == told_ || hand.q.size() <= kRightFinger) return;  // nothing new, or nothing was ever read
   told_ = state.received;
-  sensor_msgs::msg::JointState message;
-  message.header(make_header(stamp));
-  for (std::size_t j = 0; j < state.q.size(); ++j) {
-    message.name().emplace_back(kJointNames[j]);
-    message.position().push_back(state.q[j]);
-    message.velocity().push_back(state.qd[j]);
+  State x{.q = {state.q.begin(), state.q.end()}, .v = {state.qd.begin(), state.qd.end()}};
+  for (const std::size_t finger : {kLeftFinger, kRightFinger}) {
+    x.q.push_back(hand.q[finger]);
+    x.v.push_back(hand.v[finger]);
   }
-  (void)joints_.write(message);
+  arm_.tell(x, hand.stamp);
 }
 
 }  // namespace jostle::world

@@ -8,20 +8,19 @@
 
 #include "robot_bridge/ur/arm_hand.hpp"
 #include "services/wire/dds/participant.hpp"
-#include "services/wire/dds/topics.hpp"
-#include "services/wire/dds/writer.hpp"
+#include "services/world/link/robot_out.hpp"
 #include "services/world/link/robot_server.hpp"
 
 namespace jostle::world {
 
-/// An ArmBody is an arm's hand on DDS, with the arm's joints beside it, as often as the controller tells them (up to
-/// 500 times a second). Stamps are of the time of day.
+/// An ArmBody is an arm's hand on DDS, with the arm itself beside it, its joints as often as the controller tells them (up
+/// to 500 times a second). Stamps are of the time of day.
 class ArmBody final : public Body {
  public:
   /// `hand` is asked what only it knows; commands and readings pass through `robot`, which is `hand` or stands before
-  /// it. `patience`: with a commander that is silent. Both outlive it.
+  /// it. `mounting`: where the arm stands. `patience`: with a commander that is silent. Both outlive it.
   ArmBody(const wire::Participant& participant, robot_bridge::ur::ArmHand& hand, robot_bridge::Robot& robot,
-          std::chrono::milliseconds patience);
+          const robot_bridge::planar::Mounting& mounting, std::chrono::milliseconds patience);
 
   std::vector<double> limits() const override { return robot_bridge::ur::ArmHand::limits(); }
   Result<void> begin(std::span<const double> u, double duration) override;
@@ -44,7 +43,7 @@ class ArmBody final : public Body {
   std::string said_;                              // the trouble that was told last
   robot_bridge::RobotReading reading_;            // the last good one
   std::chrono::steady_clock::time_point told_{};  // when the sample came whose joints were published last
-  wire::Writer<sensor_msgs::msg::JointState> joints_;
+  RobotTopics arm_;
 };
 
 }  // namespace jostle::world

@@ -11,8 +11,6 @@ namespace {
 using std::chrono::steady_clock;
 namespace natnet = perception::natnet;
 
-constexpr std::chrono::seconds kStandingTransforms{1};  // between equal transforms
-
 }  // namespace
 
 ObjectTopics::ObjectTopics(const wire::Participant& participant, std::chrono::milliseconds pause)
@@ -29,10 +27,7 @@ void ObjectTopics::tell(const std::vector<perception::ObjectReading>& objects, d
   if (now < next_) return;
   next_ = now + pause_;
   (void)poses_.write(pose_array_message(message));
-  // tf2 complains of a transform that it has: while the world stands still, one now and then serves who comes late.
-  if (time == transforms_time_ && now < next_transforms_) return;
-  transforms_time_ = time;
-  next_transforms_ = now + kStandingTransforms;
+  if (!pace_.is_due(time)) return;
   (void)transforms_.write(transform_message(message));
 }
 

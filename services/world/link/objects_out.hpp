@@ -13,6 +13,7 @@
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/topics.hpp"
 #include "services/wire/dds/writer.hpp"
+#include "services/world/link/robot_out.hpp"
 
 namespace jostle::world {
 
@@ -35,8 +36,8 @@ class ObjectTopics final : public ObjectsOut {
 
  private:
   const std::chrono::milliseconds pause_;
-  std::chrono::steady_clock::time_point next_{}, next_transforms_{};
-  double transforms_time_ = -1.0;  // of the newest transforms, s
+  std::chrono::steady_clock::time_point next_{};
+  TransformPace pace_;
   wire::Writer<jostle_msgs::msg::ObjectStates> states_;
   wire::Writer<geometry_msgs::msg::PoseArray> poses_;
   wire::Writer<tf2_msgs::msg::TFMessage> transforms_;

@@ -11,6 +11,12 @@ namespace {
 
 using std::chrono::steady_clock;
 
+std::vector<std::string> names_of(const std::vector<physics_pool::SceneObject>& objects) {
+  std::vector<std::string> names;
+  for (const physics_pool::SceneObject& object : objects) names.push_back(object.name);
+  return names;
+}
+
 }  // namespace
 
 SimulatedWorld::SimulatedWorld(const wire::Participant& participant, const physics_pool::WorldPtr& world,
@@ -19,7 +25,7 @@ SimulatedWorld::SimulatedWorld(const wire::Participant& participant, const physi
       world_(world, options.noise),
       still_(static_cast<std::size_t>(world->geometry().layout.nu), 0.0),
       objects_(objects),
-      joints_(participant, wire::topics::kJointStates),
+      robot_(participant, world->scene().robot.model, world->scene().robot.base, names_of(world->scene().objects)),
       clock_(participant, wire::topics::kClock) {}
 
 std::vector<double> SimulatedWorld::limits() const {
@@ -68,7 +74,7 @@ void SimulatedWorld::publish() {
   (void)clock_.write(clock);
   objects_.show(truth, time);
   objects_.tell(object_readings(geometry.layout, seen), time);
-  (void)joints_.write(joint_state_message(geometry.layout, truth, time));
+  robot_.tell(truth, time);
 }
 
 }  // namespace jostle::world

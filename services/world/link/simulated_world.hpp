@@ -9,6 +9,7 @@
 #include "physics_pool/scene/scene.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 #include "services/world/link/objects_out.hpp"
+#include "services/world/link/robot_out.hpp"
 #include "services/world/link/robot_server.hpp"
 
 namespace jostle::world {
@@ -24,7 +25,7 @@ struct SimulatedWorldOptions {
   bool free_running = false;
 };
 
-/// A SimulatedWorld publishes joint states and its clock, and tells how objects are seen: all of them measurements, not
+/// A SimulatedWorld publishes its robot and its clock, and tells how objects are seen: all of them measurements, not
 /// truth.
 class SimulatedWorld final : public Body {
  public:
@@ -50,7 +51,7 @@ class SimulatedWorld final : public Body {
   bool moved_ = false;                           // a motion was begun
 
   ObjectsOut& objects_;
-  wire::Writer<sensor_msgs::msg::JointState> joints_;
+  RobotTopics robot_;
   wire::Writer<rosgraph_msgs::msg::Clock> clock_;
 };
 

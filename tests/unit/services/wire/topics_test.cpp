@@ -30,13 +30,15 @@ TEST(Names, OfOthersAreNone) {
   EXPECT_EQ(wire::wire_type("jostle_msgs/srv/Add"), std::nullopt);
 }
 
-TEST(SystemTopics, AreAllThatTheHeaderDeclares) {
-  std::ifstream header(JOSTLE_SOURCE_DIR "/services/wire/dds/topics.hpp");
+TEST(SystemTopics, AreAllThatTheHeadersDeclare) {
   static const std::regex declaration("^inline const Topic<.*>.* k\\w+\\{\"(.*)\", .*");
   std::vector<std::string> declared, listed;
-  for (std::string line; std::getline(header, line);) {
-    std::smatch match;
-    if (std::regex_match(line, match, declaration)) declared.push_back(match[1]);
+  for (const char* file : {"topics.hpp", "display_topics.hpp"}) {
+    std::ifstream header(std::string(JOSTLE_SOURCE_DIR "/services/wire/dds/") + file);
+    for (std::string line; std::getline(header, line);) {
+      std::smatch match;
+      if (std::regex_match(line, match, declaration)) declared.push_back(match[1]);
+    }
   }
   for (const auto& topic : wire::system_topics()) listed.push_back(topic.name);
   EXPECT_EQ(listed, declared);

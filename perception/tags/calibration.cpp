@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -12,9 +13,12 @@
 namespace jostle::perception {
 namespace {
 
-constexpr std::size_t kFewestViews = 8, kFewestTags = 4;
-constexpr double kLeastTurn = 25.0;  // degrees between the boards of two views
-constexpr double kLeastShare = 0.6;  // of the image's width and height that corners must span
+constexpr std::size_t kFewestViews = 10, kFewestTags = 4;
+constexpr double kLeastTurn = 25.0;    // degrees between the boards of two views
+constexpr double kLeastShare = 0.6;    // of the image's width and height that corners must span
+constexpr double kMostSpread = 0.002;  // of the focal length, two standard deviations
+constexpr double kMostError = 2.0;     // pixels
+constexpr double kMostPosition = 0.001, kMostRotation = 0.1 * M_PI / 180;  // m, rad, two standard deviations
 constexpr double kDegrees = 180 / M_PI;
 
 Result<void> check_views(int width, int height, std::span<const std::vector<TagView>> views) {
@@ -59,6 +63,20 @@ Pose pose_from(const cv::Mat& turn, const cv::Mat& way) {
   return pose_of(X);
 }
 
+Result<void> check_spread(const Calibration& calibration) {
+  const double allowed = kMostSpread / 2 * calibration.camera.fx;
+  if (calibration.focal_sigma <= allowed && calibration.centre_sigma <= allowed) return {};
+  return invalid("views",
+                 fmt::format("a focal length of {:.1f} +- {:.2f} and a centre +- {:.2f} pixels", calibration.camera.fx,
+                             2 * calibration.focal_sigma, 2 * calibration.centre_sigma),
+                 fmt::format("+- {:.2f}: take more pictures, nearer, and more tilted", 2 * allowed));
+}
+
+// The root of a covariance's largest eigenvalue.
+double largest_sigma(const Eigen::Matrix3d& covariance) {
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff());
+}
+
 }  // namespace
 
 std::vector<TagView> on_board(std::span<const Detection> seen, const Page& board) {
@@ -91,11 +109,12 @@ Result<Calibration> calibrate(int width, int height, std::span<const std::vector
       }
     }
   }
-  cv::Mat k, d;
+  cv::Mat k, d, spread, spread_of_poses, errors;
   std::vector<cv::Mat> turns, ways;
   Calibration result;
   try {
-    result.error_px = cv::calibrateCamera(places, pixels, {width, height}, k, d, turns, ways, cv::CALIB_FIX_K3);
+    result.error_px = cv::calibrateCamera(places, pixels, {width, height}, k, d, turns, ways, spread, spread_of_poses,
+                                          errors, cv::CALIB_FIX_K3 | cv::CALIB_USE_LU);
   } catch (const cv::Exception& error) {
     return Error{Code::kInvalidArgument, fmt::format("views: no camera explains them: {}", error.err)};
   }
@@ -108,7 +127,40 @@ Result<Calibration> calibrate(int width, int height, std::span<const std::vector
                    .cx = k.at<double>(0, 2),
                    .cy = k.at<double>(1, 2)};
   for (int i = 0; i < 5; ++i) result.camera.distortion.at(static_cast<std::size_t>(i)) = d.at<double>(i);
+  result.focal_sigma = std::max(spread.at<double>(0), spread.at<double>(1));
+  result.centre_sigma = std::max(spread.at<double>(2), spread.at<double>(3));
+  if (auto ok = check_spread(result); !ok) return ok.error();
   return result;
+}
+
+Result<Extrinsics> locate_camera(const Camera& camera, std::span<const TagView> tags) {
+  if (tags.size() < kFewestTags)
+    return invalid("tags", fmt::format("{} at known places", tags.size()),
+                   fmt::format("at least {}: look whether they are in the light, and whole", kFewestTags));
+  const auto estimate_result = estimate_pose(camera, tags);
+  if (!estimate_result) return estimate_result.error();
+  const Eigen::Isometry3d X_CW = transform(estimate_result->best.X_CB);
+  Extrinsics result{.X_WC = pose_of(X_CW.inverse()), .error_px = estimate_result->best.error_px};
+  if (result.error_px > kMostError)
+    return invalid("tags", fmt::format("corners that are {:.1f} pixels from where their places say", result.error_px),
+                   fmt::format("at most {:.0f}: measure the places again, and the tags' size", kMostError));
+  // p_WC = -R_CW^T p_CW, moved by an error of either.
+  const Eigen::Map<const Eigen::Matrix<double, 6, 6>> covariance(estimate_result->covariance.data());
+  const Eigen::Vector3d p = X_CW.translation();
+  Eigen::Matrix3d cross;
+  cross << 0, -p.z(), p.y(), p.z(), 0, -p.x(), -p.y(), p.x(), 0;
+  Eigen::Matrix<double, 3, 6> slope;
+  slope << Eigen::Matrix3d::Identity(), cross;
+  // Corners may be farther off than in rendered images.
+  const double worse = std::max(result.error_px / (std::sqrt(2.0) * kCornerSigma), 1.0);
+  result.position_sigma = worse * largest_sigma(slope * covariance * slope.transpose());
+  result.rotation_sigma = worse * largest_sigma(covariance.bottomRightCorner<3, 3>());
+  if (2 * result.position_sigma <= kMostPosition && 2 * result.rotation_sigma <= kMostRotation) return result;
+  return invalid("tags",
+                 fmt::format("a camera's place +- {:.1f} mm and +- {:.2f} degrees", 2e3 * result.position_sigma,
+                             2 * kDegrees * result.rotation_sigma),
+                 fmt::format("+- {:.0f} mm and {:.1f} degrees: use more tags, larger ones, and farther apart",
+                             1e3 * kMostPosition, kDegrees * kMostRotation));
 }
 
 }  // namespace jostle::perception

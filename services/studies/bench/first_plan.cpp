@@ -127,7 +127,8 @@ Result<std::vector<FirstPlanSide>> measure_first_plans(const FirstPlanOptions& o
     auto truth_result = physics_pool::World::compile(*scene_result);
     if (!truth_result) return truth_result.error();
     for (FirstPlanSide& side : sides) {
-      const auto ok = run_in(*scene_result, *truth_result, seed, &side == &sides.back() ? after : before, pool, side, stop);
+      const auto ok =
+          run_in(*scene_result, *truth_result, seed, &side == &sides.back() ? after : before, pool, side, stop);
       if (stop.stop_requested()) return sides;
       if (!ok) return ok.error();
       options.line->step(

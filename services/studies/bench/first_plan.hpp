@@ -40,9 +40,9 @@ struct FirstPlanSide {
   std::vector<TimedPlan> first, replans;  ///< first: one per world, those that failed with the time that they took
 };
 
-/// Runs the controller `or` with the parameters of `jostle run` in every world, the sides in turns: without guidance, if
-/// asked for, then with it. After a stop request it returns what was measured until then.
-/// Errors   those of the scenes, the pool and the controller
+/// Runs the controller `or` with the parameters of `jostle run` in every world, the sides in turns: without guidance,
+/// if asked for, then with it. After a stop request it returns what was measured until then. Errors   those of the
+/// scenes, the pool and the controller
 Result<std::vector<FirstPlanSide>> measure_first_plans(const FirstPlanOptions& options,
                                                        const std::filesystem::path& parameters, std::stop_token stop);
 

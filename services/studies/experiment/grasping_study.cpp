@@ -18,6 +18,7 @@
 #include "services/common/results/results.hpp"
 #include "services/common/results/table.hpp"
 #include "services/studies/experiment/options.hpp"
+#include "services/studies/experiment/runs.hpp"
 #include "services/task/session/composition.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 
@@ -121,9 +122,8 @@ Result<json> grasp(const GraspingStudy& study, const Case& one, std::stop_token 
   auto outcome_result = run_result->perform(robot, objects, {}, stop);
   if (!outcome_result) return outcome_result.error();
   const planners::Outcome& outcome = *outcome_result;
-  const std::chrono::duration<double> replanning = outcome.planning_time - outcome.plan_time;
   Measured measured{.others_in_hand = count_obstructions(run_result->geometry(), outcome.observed.back()),
-                    .execution_seconds = replanning.count() + outcome.actions * study.parameters.planner.step_duration};
+                    .execution_seconds = execution_seconds(outcome, study.parameters.planner.step_duration)};
   if (outcome.actions > 0) {
     measured.execution_cost = execution_cost(run_result->geometry(), study.parameters.objective, outcome.observed);
   }

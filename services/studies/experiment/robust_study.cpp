@@ -40,7 +40,6 @@ json record_of(const Case& one, const planners::Outcome& outcome, double step_du
     const auto& robustness = outcome.first_plan.robustness;
     return robustness ? common::number_or_null(((*robustness).*which).value) : json();
   };
-  const std::chrono::duration<double> acting = outcome.planning_time - outcome.plan_time;
   return {{"seed", one.seed},
           {"method", one.method},
           {"success", outcome.success},
@@ -52,7 +51,7 @@ json record_of(const Case& one, const planners::Outcome& outcome, double step_du
           {"rollouts", outcome.rollouts},
           {"plan_rollouts", outcome.first_plan.rollouts},
           {"planning_seconds", outcome.plan_time.count()},
-          {"execution_seconds", outcome.actions * step_duration + acting.count()},
+          {"execution_seconds", execution_seconds(outcome, step_duration)},
           {"expected", metric(&planners::Robustness::expected)},
           {"maximal", metric(&planners::Robustness::maximal)},
           {"nominal_expected", metric(&planners::Robustness::nominal_expected)},

@@ -2,6 +2,7 @@
 /// \file
 /// What studies of whole runs read of their records, and say of many.
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -17,6 +18,14 @@ inline bool ended_as(const nlohmann::json& run, planners::Ending ending) {
 }
 inline double actions(const nlohmann::json& run) { return run["actions"]; }
 inline double planning(const nlohmann::json& run) { return run["planning_seconds"]; }  ///< s
+
+/// Returns what followed the first plan, s: other plans by the clock, and each action by the world's (Fig. 3.5d, 4.4c).
+inline double execution_seconds(const planners::Outcome& outcome, double step_duration) {
+  const bool has_plan = !outcome.first_plan.controls.values.empty();
+  const std::chrono::duration<double> replanning =
+      outcome.planning_time - (has_plan ? outcome.plan_time : outcome.planning_time);
+  return replanning.count() + outcome.actions * step_duration;
+}
 
 /// Returns the mean of `value` of each run.
 template <class Value>

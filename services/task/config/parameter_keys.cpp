@@ -142,7 +142,8 @@ void add_guidance(std::vector<ParameterKey>& keys) {
       [](auto& p) -> auto& { return p.guidance.generations; }));
   keys.push_back(key(
       "planner.guidance_judged", "", 1, 8,
-      "Candidates that the engine judges in an iteration, side by side; doubled after each that the engine denied, up to "
+      "Candidates that the engine judges in an iteration, side by side; doubled after each that the engine denied, up "
+      "to "
       "8.",
       [](auto& p) -> auto& { return p.guidance.judged; }));
 }

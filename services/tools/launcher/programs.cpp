@@ -16,6 +16,7 @@ constexpr auto kPurposes = std::to_array<std::pair<std::string_view, std::string
     {"bench", "measure physics, pools and planners on this machine"},
     {"bridge", "drive a robot by its own protocols"},
     {"perceive", "publish what motion capture or a camera sees of the objects"},
+    {"calibrate", "find a camera's intrinsics, and where it is, from pictures of printed tags"},
     {"coordinator", "plan and re-plan with a pool of workers"},
     {"discovery-server", "introduce machines to each other where there is no multicast"},
     {"doctor", "say what is wrong with this machine, and the remedy"},

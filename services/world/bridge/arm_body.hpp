@@ -13,8 +13,8 @@
 
 namespace jostle::world {
 
-/// An ArmBody is an arm's hand on DDS, with the arm itself beside it, its joints as often as the controller tells them (up
-/// to 500 times a second). Stamps are of the time of day.
+/// An ArmBody is an arm's hand on DDS, with the arm itself beside it, its joints as often as the controller tells them
+/// (up to 500 times a second). Stamps are of the time of day.
 class ArmBody final : public Body {
  public:
   /// `hand` is asked what only it knows; commands and readings pass through `robot`, which is `hand` or stands before

@@ -26,9 +26,9 @@ Pose sheet_at(double x, double y, double z, double tilt, double about) {
 
 std::vector<Pose> good_poses() {
   std::vector<Pose> poses;
-  for (int i = 0; i < 12; ++i)
+  for (int i = 0; i < 24; ++i)
     poses.push_back(
-        sheet_at(0.16 * (i % 3 - 1), 0.05 * (i % 2 == 0 ? 1 : -1), 0.42 + 0.02 * (i % 4), 0.55, 2 * M_PI * i / 12));
+        sheet_at(0.16 * (i % 3 - 1), 0.05 * (i % 2 == 0 ? 1 : -1), 0.42 + 0.02 * (i % 4), 0.55, 2 * M_PI * i / 24));
   return poses;
 }
 
@@ -61,11 +61,16 @@ TEST(Calibration, RenderedSheetsGiveTheCameraThatRenderedThem) {
   EXPECT_NEAR(result->camera.cy, truth.cy, 0.002 * truth.width);
   EXPECT_NEAR(result->camera.distortion[0], truth.distortion[0], 0.02);
   EXPECT_LT(result->error_px, 0.2);
+  EXPECT_LT(std::abs(result->camera.fx - truth.fx), 3 * result->focal_sigma);
   ASSERT_EQ(result->X_CB.size(), poses.size());
+  // The sheet's pose in one picture is a by-product; where a camera is, locate_camera() finds.
+  double squares = 0.0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     EXPECT_LT(distance_between(result->X_CB[i], poses[i]), 0.001);
-    EXPECT_LT(rotation_between(result->X_CB[i], poses[i]), 0.1 * M_PI / 180);
+    const double turn = rotation_between(result->X_CB[i], poses[i]);
+    squares += turn * turn / static_cast<double>(poses.size());
   }
+  EXPECT_LT(std::sqrt(squares), 0.1 * M_PI / 180);
 }
 
 TEST(Calibration, TooFewOrTooSimilarViewsAreRefused) {
@@ -89,8 +94,8 @@ TEST(Calibration, TooFewOrTooSimilarViewsAreRefused) {
   };
   auto poses = good_poses();
   EXPECT_EQ(complaint(perfect(poses)), "nothing");
-  poses.resize(7);
-  EXPECT_THAT(complaint(perfect(poses)), HasSubstr("got 7 of 7 with 4 tags or more, wanted at least 8"));
+  poses.resize(9);
+  EXPECT_THAT(complaint(perfect(poses)), HasSubstr("got 9 of 9 with 4 tags or more, wanted at least 10"));
   poses.clear();
   for (int i = 0; i < 10; ++i) poses.push_back(sheet_at(0, 0, 0.9, 0.5, i));
   EXPECT_THAT(complaint(perfect(poses)), HasSubstr("towards the image's borders"));
@@ -98,6 +103,47 @@ TEST(Calibration, TooFewOrTooSimilarViewsAreRefused) {
   for (int i = 0; i < 10; ++i)
     poses.push_back(sheet_at(0.16 * (i % 3 - 1), 0.06 * (i % 2 == 0 ? 1 : -1), 0.45, 0.1, i));
   EXPECT_THAT(complaint(perfect(poses)), HasSubstr("tilted alike"));
+}
+
+// Four sheets flat on a table, below a camera that looks down at a slant.
+std::vector<TagView> tags_on_table(const Pose& X_WC, double size, int count, std::uint64_t seed) {
+  const Camera camera = distorting_camera();
+  View view{.X_WC = X_WC};
+  for (int i = 0; i < count; ++i) {
+    Eigen::Isometry3d X_WT = Eigen::Isometry3d::Identity();
+    X_WT.translation() = Eigen::Vector3d(0.25 * (i % 3 - 1), 0.15 * (i / 3 - 1), 0);
+    X_WT.rotate(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()));
+    view.stickers.push_back({i, size, pose_of(X_WT)});
+  }
+  Detector detector;
+  std::vector<TagView> tags;
+  for (const Detection& seen : detector.detect(SceneCamera(camera).render(view, seed)))
+    tags.push_back({seen.corners, size, view.stickers[static_cast<std::size_t>(seen.id)].X_WT});
+  return tags;
+}
+
+TEST(Extrinsics, RenderedTagsAtKnownPlacesSayWhereTheCameraIs) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    const Pose X_WC = looking_at({0.2 - 0.1 * static_cast<double>(seed), -0.4, 0.8}, {0, 0, 0});
+    const auto result = locate_camera(distorting_camera(), tags_on_table(X_WC, 0.1, 9, seed));
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_LT(distance_between(result->X_WC, X_WC), 0.001);
+    EXPECT_LT(rotation_between(result->X_WC, X_WC), 0.1 * M_PI / 180);
+    EXPECT_LT(distance_between(result->X_WC, X_WC), 4 * result->position_sigma);
+  }
+}
+
+TEST(Extrinsics, WhatDoesNotSayEnoughIsRefused) {
+  const Pose X_WC = looking_at({0, -0.4, 0.8}, {0, 0, 0});
+  const auto complaint = [&](const std::vector<TagView>& tags) {
+    const auto result = locate_camera(distorting_camera(), tags);
+    return result ? std::string("nothing") : result.error().message;
+  };
+  EXPECT_THAT(complaint(tags_on_table(X_WC, 0.1, 3, 1)), HasSubstr("tags: got 3 at known places, wanted at least 4"));
+  EXPECT_THAT(complaint(tags_on_table(X_WC, 0.02, 4, 1)), HasSubstr("use more tags, larger ones"));
+  auto tags = tags_on_table(X_WC, 0.1, 9, 1);
+  tags[4].X_BT.position[0] += 0.03;
+  EXPECT_THAT(complaint(tags), HasSubstr("measure the places again"));
 }
 
 }  // namespace

@@ -135,24 +135,27 @@ TEST_F(GraspingStudyRun, HasARowPerCellAndAnEntryPerRun) {
   std::size_t place = 0;
   for (const char* level : {"none", "low"}) {
     for (const char* controller : {"or", "nr"}) {
-      const json& row = result["rows"][place / 2];
-      EXPECT_THAT(
-          keys_of(row),
-          UnorderedElementsAre("level", "controller", "successes", "runs", "timed_out", "broken", "interval", "replans",
-                               "replans_half_width", "execution_cost", "execution_cost_half_width", "plan_seconds",
-                               "plan_seconds_half_width", "total_seconds", "total_seconds_half_width"));
+      const json& row = result["rows"][place];
+      EXPECT_THAT(keys_of(row),
+                  UnorderedElementsAre("level", "controller", "successes", "runs", "target_alone", "timed_out",
+                                       "broken", "interval", "replans", "replans_half_width", "execution_cost",
+                                       "execution_cost_half_width", "plan_seconds", "plan_seconds_half_width",
+                                       "execution_seconds", "execution_seconds_half_width", "total_seconds",
+                                       "total_seconds_half_width"));
       EXPECT_EQ(row["level"], level);
       EXPECT_EQ(row["controller"], controller);
       EXPECT_EQ(row["runs"], 2);
       EXPECT_EQ(row["timed_out"], 0);
       EXPECT_EQ(row["broken"], 0);
       expect_share(row);
-      int successes = 0;
+      int successes = 0, alone = 0;
       for (const int seed : {1, 2}) {
-        const json& run = result["runs"][place++];
-        EXPECT_THAT(keys_of(run), UnorderedElementsAre("seed", "level", "controller", "success", "ending", "reason",
-                                                       "plan_hash", "plan_seconds", "planning_seconds", "total_seconds",
-                                                       "replans", "actions", "rollouts", "execution_cost"));
+        const json& run = result["runs"][place + 4 * (static_cast<std::size_t>(seed) - 1)];
+        EXPECT_THAT(keys_of(run),
+                    UnorderedElementsAre("seed", "level", "controller", "success", "ending", "reason", "plan_hash",
+                                         "plan_seconds", "planning_seconds", "total_seconds", "replans", "actions",
+                                         "rollouts", "execution_cost", "execution_seconds", "others_in_hand"));
+        EXPECT_GE(run["execution_seconds"].get<double>() + 1e-9, run["actions"].get<double>());  // a second each
         EXPECT_EQ(run["seed"], seed);
         EXPECT_EQ(run["level"], level);
         EXPECT_EQ(run["controller"], controller);
@@ -163,8 +166,11 @@ TEST_F(GraspingStudyRun, HasARowPerCellAndAnEntryPerRun) {
         EXPECT_LE(run["plan_seconds"], run["planning_seconds"]);
         EXPECT_LE(run["planning_seconds"], run["total_seconds"]);
         if (run["success"]) ++successes;
+        if (run["success"] && run["others_in_hand"] == 0) ++alone;
       }
+      ++place;
       EXPECT_EQ(row["successes"], successes);
+      EXPECT_EQ(row["target_alone"], alone);
       EXPECT_EQ(row["execution_cost"].is_null(), successes == 0);
       EXPECT_EQ(row["execution_cost_half_width"].is_null(), successes < 2);
     }
@@ -222,9 +228,10 @@ TEST_F(TimedOutGraspingRun, IsToldApartAndCountsWithWhatItSpent) {
   const json& row = report.json["rows"][0];
   EXPECT_EQ(row["runs"], 1);
   EXPECT_EQ(row["timed_out"], 1);
+  EXPECT_EQ(run["execution_seconds"], 0.0);  // nothing came of the first plan
   for (const char* key : {"replans", "execution_cost", "plan_seconds", "total_seconds", "total_seconds_half_width"})
     EXPECT_TRUE(row[key].is_null()) << key;
-  EXPECT_THAT(report.table, ::testing::ContainsRegex("none +or +- +- +- +-\n"));
+  EXPECT_THAT(report.table, ::testing::ContainsRegex("none +or +- +- +- +- +-\n"));
   EXPECT_THAT(report.table, ::testing::Not(HasSubstr("±")));
 }
 

@@ -339,7 +339,9 @@ bool Scheduler::idle(const Worker& worker, TimePoint now) const {
 void Scheduler::assign_copies(TimePoint now, std::vector<Assignment>& assignments) {
   std::vector<Copyable> copies;
   bool known = false;
-  for (auto& [id, worker] : workers_) {
+  for (auto& entry : workers_) {
+    const WorkerId id = entry.first;
+    Worker& worker = entry.second;
     while (idle(worker, now)) {
       if (!std::exchange(known, true)) copies = copyable(now);
       const auto copy = std::ranges::find_if(copies, [&](const Copyable& candidate) { return candidate.holder != id; });

@@ -415,7 +415,13 @@ void RemotePool::absorb(Received received, TimePoint now) {
   const std::shared_ptr<Active> active = found->second;
   const bool refused = !result.error().empty();
   const WorkerId worker = received.worker;
-  auto outcome_result = wire::from_wire(std::move(result));  // its numbers stay readable
+  const auto between = [](std::int64_t from, std::int64_t to) {
+    return std::chrono::duration<double>(1e-9 * (static_cast<double>(to) - static_cast<double>(from)));
+  };
+  const std::uint64_t epoch = result.epoch(), engine_steps = result.engine_steps();
+  const std::uint32_t sample = result.sample();
+  const auto ran = between(result.started(), result.finished()), there = between(result.arrived(), result.finished());
+  auto outcome_result = wire::from_wire(std::move(result));
   if (refused) {
     const Error& error = outcome_result.error();
     const std::string why = common::shown(error.message, limits::kShownError);
@@ -427,12 +433,7 @@ void RemotePool::absorb(Received received, TimePoint now) {
     return miss(*active, worker, outcome_result ? "its result does not fit the batch" : outcome_result.error().message,
                 now);
   }
-  const auto between = [](std::int64_t from, std::int64_t to) {
-    return std::chrono::duration<double>(1e-9 * (static_cast<double>(to) - static_cast<double>(from)));
-  };
-  const bool first = scheduler_.accept(
-      worker, result.epoch(), result.sample(), result.engine_steps(), now,
-      {.ran = between(result.started(), result.finished()), .there = between(result.arrived(), result.finished())});
+  const bool first = scheduler_.accept(worker, epoch, sample, engine_steps, now, {.ran = ran, .there = there});
   trace(received, first);
   if (!first) return;
   active->progress = now;

@@ -21,7 +21,6 @@ namespace jostle::studies {
 namespace {
 
 using common::number_or_null;
-using physics_pool::BatchReply;
 using physics_pool::RolloutBatch;
 using physics_pool::Scene;
 using planners::Forecast;

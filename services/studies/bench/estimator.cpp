@@ -73,7 +73,7 @@ class World {
         object = {.name = object.name, .shape = physics_pool::Shape::kCylinder, .radius = 0.03, .height = 0.1};
       // The next one is 1 cm away or farther at any time.
       object.x = 0.18 * (i % 3 - 1) + 0.01 * uniform(random);
-      object.y = 0.09 * (i / 3) + 0.01 * uniform(random);
+      object.y = (i < 3 ? 0.0 : 0.09) + 0.01 * uniform(random);
       object.yaw = 0.3 * uniform(random);
       scene_.objects.push_back(object);
     }

@@ -1,9 +1,8 @@
 #include "services/studies/bench/fleet.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <deque>
 #include <functional>
 #include <map>

@@ -1,10 +1,10 @@
 #include "services/studies/bench/swarm.hpp"
 
 #include <fmt/format.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <ctime>
 #include <fstream>
 
 #include "services/common/process/files.hpp"

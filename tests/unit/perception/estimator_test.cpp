@@ -296,7 +296,7 @@ TEST(Estimator, OfTwoMinimaTheOneThatLastsIsBelieved) {
     if (is_flipped) std::swap(sighting.explanations[0], sighting.explanations[1]);
     ASSERT_TRUE(sut.take(i * kFrame, {sighting}));
     if (i < 60) continue;
-    const auto& q = sut.at(i * kFrame).at(0).reading.orientation;
+    const auto q = sut.at(i * kFrame).at(0).reading.orientation;
     EXPECT_LT(Quaterniond(q[0], q[1], q[2], q[3]).angularDistance(truth), 0.02);
   }
 }

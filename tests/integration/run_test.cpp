@@ -248,7 +248,7 @@ INSTANTIATE_TEST_SUITE_P(Physics, RunWith,
                          [](const auto& planner) { return planner.index == 0 ? "full" : "cheap"; });
 
 TEST_F(Run, WorkerStartedByHandJoinsAPlanThatRuns) {
-  start_planning();
+  start_planning({"--set", "planner.guidance_judged=6"});  // work for more than the two that are there
   const auto participant = wire::Participant::open({.domain = domain}).value();
   wire::Inbox<jostle_msgs::msg::Feedback> feedback(participant, wire::topics::kTaskFeedback, 64);
 

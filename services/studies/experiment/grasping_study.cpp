@@ -225,12 +225,8 @@ class GraspingStudyRunner final : public Study {
   }
 
   StudyReport report(const std::vector<json>& records) const override {
-    std::vector<json> runs;  // with those that broke
-    for (std::size_t i = 0; i < records.size(); ++i) {
-      if (records[i].is_null()) continue;
-      runs.push_back(records[i].contains("error") ? record_of(cases_[i], records[i]["error"].get<std::string>())
-                                                  : records[i]);
-    }
+    std::vector<json> runs =
+        runs_of(records, [this](std::size_t i, const std::string& error) { return record_of(cases_[i], error); });
     const std::vector<Cell> all = cells(runs);
     return {.table = table_of(all), .json = json_of(all, runs)};
   }

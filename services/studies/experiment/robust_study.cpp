@@ -204,12 +204,8 @@ class RobustStudyRunner final : public Study {
   }
 
   StudyReport report(const std::vector<json>& records) const override {
-    json runs = json::array();  // with those that broke
-    for (std::size_t i = 0; i < records.size(); ++i) {
-      if (records[i].is_null()) continue;
-      runs.push_back(records[i].contains("error") ? broken_record(cases_[i], records[i]["error"].get<std::string>())
-                                                  : records[i]);
-    }
+    json runs =
+        runs_of(records, [this](std::size_t i, const std::string& error) { return broken_record(cases_[i], error); });
     const std::vector<Cell> all = cells(runs);
     json rows = json::array(), compared = json::array();
     for (const Cell& cell : all) rows.push_back(row_of(cell));

@@ -27,6 +27,18 @@ inline double execution_seconds(const planners::Outcome& outcome, double step_du
   return replanning.count() + outcome.actions * step_duration;
 }
 
+/// Returns the records of all cases that were run, in their order; for one in which a part of the system failed, what
+/// broken(index, error) makes of it.
+template <class Broken>
+std::vector<nlohmann::json> runs_of(const std::vector<nlohmann::json>& records, Broken broken) {
+  std::vector<nlohmann::json> runs;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (records[i].is_null()) continue;
+    runs.push_back(records[i].contains("error") ? broken(i, records[i]["error"].get<std::string>()) : records[i]);
+  }
+  return runs;
+}
+
 /// Returns the mean of `value` of each run.
 template <class Value>
 common::Mean mean_over(const std::vector<const nlohmann::json*>& runs, Value value) {

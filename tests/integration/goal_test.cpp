@@ -3,7 +3,11 @@
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
+#include <thread>
 
+#include "services/task/run/goal_client.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -64,6 +68,53 @@ TEST_F(Goal, IsCancelledByCtrlC) {
   EXPECT_EQ(asked->wait(kPatience), 130);
   EXPECT_THAT(asked->err(), HasSubstr("the task was cancelled"));
   EXPECT_FALSE(coordinator->code());
+}
+
+// A coordinator that says what a test lets it say, ten times a second, and never gives a result.
+class MuteCoordinator {
+ public:
+  explicit MuteCoordinator(int domain) : participant_(wire::Participant::open({.domain = domain}).value()) {}
+
+  void phase_of_each_goal(std::string phase) {
+    speaker_ = std::jthread([this, phase = std::move(phase)](std::stop_token stop) {
+      jostle_msgs::msg::Feedback feedback;
+      feedback.phase("idle");
+      while (!stop.stop_requested()) {
+        if (const auto goal = goals_.take(std::chrono::steady_clock::now() + std::chrono::milliseconds(100), stop)) {
+          feedback.goal_id(goal->goal_id());
+          feedback.phase(phase);
+        }
+        (void)feedback_.write(feedback);
+      }
+    });
+  }
+
+ private:
+  const wire::Participant participant_;
+  wire::Writer<jostle_msgs::msg::Feedback> feedback_{participant_, wire::topics::kTaskFeedback};
+  wire::Writer<jostle_msgs::msg::GoalResult> results_{participant_, wire::topics::kTaskResult};
+  wire::Inbox<jostle_msgs::msg::Goal> goals_{participant_, wire::topics::kTaskGoal, 1};
+  std::jthread speaker_;
+};
+
+TEST_F(Goal, WhoseResultIsLostEndsAfterAWhile) {
+  MuteCoordinator coordinator(domain);
+  coordinator.phase_of_each_goal("done");
+  const auto world = start_world();
+
+  EXPECT_EQ(ask({"--wait", "60"}), 3);
+
+  EXPECT_THAT(asked->err(), HasSubstr("was done with the goal 10 s ago, and its result did not arrive"));
+}
+
+TEST_F(Goal, ThatIsWorkedOnIsWaitedFor) {
+  MuteCoordinator coordinator(domain);
+  coordinator.phase_of_each_goal("planning");
+  const auto world = start_world();
+  asked = program("jostle_goal", {easy, "--headless", "--wait", "60"});
+  ASSERT_TRUE(asked->says("planning", kPatience)) << asked->err();
+
+  EXPECT_FALSE(asked->wait(task::GoalClient::kIdlePatience + std::chrono::seconds(2))) << asked->err();
 }
 
 }  // namespace

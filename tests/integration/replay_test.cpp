@@ -126,7 +126,7 @@ TEST_F(RecordedRuns, OfBeforeAreDecidedTheSameAgain) {
 
 TEST_F(RecordedRuns, AreWholeEvenIfTheRecorderCameLate) {
   start_acting(0.3);  // 17 s are left: long enough for a recorder to start, on however busy a machine
-  EXPECT_EQ(program_ends("jostle_record", {"--output", bag("late"), "--until-result"}), 0) << err;
+  EXPECT_EQ(program_ends("jostle_record", {"--output", bag("late"), "--until-result"}), 0) << err << run->err();
   ASSERT_TRUE(run->wait(kPatience)) << run->err();
 
   EXPECT_EQ(program_ends("jostle_replay", {bag("late")}), 0) << out << err;

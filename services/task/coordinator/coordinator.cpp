@@ -12,9 +12,9 @@
 #include "services/common/process/program.hpp"
 #include "services/common/process/trouble.hpp"
 #include "services/task/coordinator/markers.hpp"
+#include "services/task/session/phases.hpp"
 #include "services/wire/limits.hpp"
 #include "services/world/link/messages.hpp"
-#include "services/world/link/world_client.hpp"
 
 namespace jostle::task {
 
@@ -29,20 +29,6 @@ constexpr std::size_t kGoalQueue = 8;
 constexpr std::chrono::milliseconds kLastWords{300};  // for readers to receive what was written
 constexpr std::chrono::seconds kAnswerPatience{2};    // for the middleware to take a result
 constexpr std::chrono::milliseconds kAnswerPause{50};
-
-const char* word(planners::Phase phase) {
-  switch (phase) {
-    case planners::Phase::kPlanning:
-      return "planning";
-    case planners::Phase::kActing:
-      return "acting";
-    case planners::Phase::kClosing:
-      return "closing";
-    case planners::Phase::kDone:
-      return "done";
-  }
-  return "";
-}
 
 // What one worker did.
 struct Share {
@@ -238,28 +224,29 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   jostle_msgs::msg::GoalResult result;
   result.goal_id(goal.goal_id());
   const Shares before = shares_of(pool_.status());
-  {
-    const std::jthread refuser([this](std::stop_token own) { refuse_goals_meanwhile(own); });
-    auto ok = check_sizes(goal);
-    auto task_result = ok ? Task::prepare(goal, pool_, [](const std::string& why) { spdlog::info("split: {}", why); })
-                          : Result<Task>(ok.error());
-    const Performance done = task_result ? perform(goal, *task_result, cancelled)
-                                         : Performance{.outcome = {}, .seen = {}, .ended = task_result.error()};
-    if (done.outcome) {
-      result.ending(on_the_wire(done.outcome->ending));
-      result.success(done.outcome->success);
-      result.reason(done.outcome->reason);
-      result.report(
-          report_of(*done.outcome, *task_result, goal.seed(), since(before, shares_of(pool_.status())), done.seen));
-    }
-    if (!done.ended) {
-      const Error& error = done.ended.error();
-      const bool was_cancelled = error.code == Code::kCancelled;
-      result.ending(on_the_wire(was_cancelled ? planners::Ending::kCancelled : planners::Ending::kBroken));
-      result.reason(was_cancelled ? "cancelled" : "the system failed");
-      result.error(common::shown(error.message, limits::kShownError));
-    }
+  std::jthread refuser([this](std::stop_token own) { refuse_goals_meanwhile(own); });
+  auto ok = check_sizes(goal);
+  auto task_result = ok ? Task::prepare(goal, pool_, [](const std::string& why) { spdlog::info("split: {}", why); })
+                        : Result<Task>(ok.error());
+  // These and the task end after the answer: taking endpoints and worlds down takes its time, and somebody waits.
+  std::optional<Link> link;
+  const Performance done = task_result ? perform(goal, *task_result, link.emplace(participant_), cancelled)
+                                       : Performance{.outcome = {}, .seen = {}, .ended = task_result.error()};
+  if (done.outcome) {
+    result.ending(on_the_wire(done.outcome->ending));
+    result.success(done.outcome->success);
+    result.reason(done.outcome->reason);
+    result.report(
+        report_of(*done.outcome, *task_result, goal.seed(), since(before, shares_of(pool_.status())), done.seen));
   }
+  if (!done.ended) {
+    const Error& error = done.ended.error();
+    const bool was_cancelled = error.code == Code::kCancelled;
+    result.ending(on_the_wire(was_cancelled ? planners::Ending::kCancelled : planners::Ending::kBroken));
+    result.reason(was_cancelled ? "cancelled" : "the system failed");
+    result.error(common::shown(error.message, limits::kShownError));
+  }
+  refuser = {};  // whoever asks once he has heard the result is served
   spdlog::info("goal {}: {} {}", id, result.reason(), result.error());
   answer(result, stop);
   const std::lock_guard lock(mutex_);
@@ -279,10 +266,8 @@ void Coordinator::answer(const jostle_msgs::msg::GoalResult& result, std::stop_t
   }
 }
 
-Coordinator::Performance Coordinator::perform(const Goal& goal, Task& task, std::stop_token stop) {
+Coordinator::Performance Coordinator::perform(const Goal& goal, Task& task, Link& link, std::stop_token stop) {
   const physics_pool::TaskGeometry& geometry = task.geometry();
-  world::RobotClient robot(participant_);
-  world::ObjectsClient objects(participant_, robot);
   const std::string goal_text = fmt::format("goal {}: ", shown(goal.goal_id()));
   tell(run_writer_, describe_run(goal), goal_text + "its beginning");
   // Whoever misses markers sees less, and nothing is decided by them.
@@ -310,8 +295,9 @@ Coordinator::Performance Coordinator::perform(const Goal& goal, Task& task, std:
                         tell(plan_writer_, plan, fmt::format("{}plan {}", goal_text, plan.number()));
                         (void)plan_marker_writer_.write(plan_markers(geometry, plan));
                       }},
-      .time = [&] { return robot.time(); }};
-  if (auto ended = task.perform(robot, objects, watch, std::move(stop)); !ended) performance.ended = ended.error();
+      .time = [&] { return link.robot.time(); }};
+  if (auto ended = task.perform(link.robot, link.objects, watch, std::move(stop)); !ended)
+    performance.ended = ended.error();
   return performance;
 }
 

@@ -17,6 +17,7 @@
 #include "services/wire/dds/reader.hpp"
 #include "services/wire/dds/topics.hpp"
 #include "services/wire/dds/writer.hpp"
+#include "services/world/link/world_client.hpp"
 
 namespace jostle::task {
 
@@ -63,7 +64,13 @@ class Coordinator {
     std::vector<jostle_msgs::msg::Observation> seen;  // as the journal was told; entry i became outcome->observed[i]
     Result<void> ended;
   };
-  Performance perform(const Goal& goal, Task& task, std::stop_token stop);
+  // The world of one goal, as the wire shows it.
+  struct Link {
+    explicit Link(const wire::Participant& participant) : robot(participant), objects(participant, robot) {}
+    world::RobotClient robot;
+    world::ObjectsClient objects;
+  };
+  Performance perform(const Goal& goal, Task& task, Link& link, std::stop_token stop);
   void serve(const Goal& goal, std::stop_token stop);
   void answer(const jostle_msgs::msg::GoalResult& result, std::stop_token stop);
   void refuse_goals_meanwhile(std::stop_token stop);

@@ -1,11 +1,14 @@
 #include "services/task/run/goal_client.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 #include <utility>
 
-namespace jostle::task {
+#include "services/task/session/phases.hpp"
 
+namespace jostle::task {
 GoalClient::GoalClient(const wire::Participant& participant, std::string goal_id, Listener listener)
     : goal_id_(std::move(goal_id)),
       listener_(std::move(listener)),
@@ -21,12 +24,34 @@ void GoalClient::listen() {
     coordinator_heard_ = Clock::now();
     // Ours is idle until it gets our goal; it may be the last one we hear of.
     if (!sent_ && !feedback.goal_id().empty()) others_heard_ = Clock::now();
-    if (!sent_ || feedback.goal_id() != goal_id_) continue;
+    if (!sent_) continue;
+    note_work(feedback);
+    if (feedback.goal_id() != goal_id_) continue;
     if (listener_.on_feedback) listener_.on_feedback(feedback);
     if (std::exchange(trouble_, feedback.trouble()) == feedback.trouble() || trouble_.empty()) continue;
     if (listener_.on_notice) listener_.on_notice(trouble_);
   }
   if (!world_.take_all().empty()) world_heard_ = Clock::now();
+}
+
+void GoalClient::note_work(const jostle_msgs::msg::Feedback& feedback) {
+  const bool is_ours = feedback.goal_id() == goal_id_;
+  taken_up_ = taken_up_ || is_ours;
+  if (is_ours && feedback.phase() != word(planners::Phase::kDone)) {
+    idle_since_.reset();
+  } else if (!idle_since_) {
+    idle_since_ = Clock::now();
+  }
+}
+
+Result<void> GoalClient::check_at_work() const {
+  if (!idle_since_ || Clock::now() - *idle_since_ < kIdlePatience) return {};
+  return Error{
+      Code::kUnavailable,
+      fmt::format("the coordinator {} {} s ago, and {}; its log may say why, and fewer --workers leave it more "
+                  "of a busy machine",
+                  taken_up_ ? "was done with the goal" : "was sent the goal", kIdlePatience.count(),
+                  taken_up_ ? "its result did not arrive" : "it has not begun with it")};
 }
 
 std::vector<std::uint64_t> GoalClient::coordinators() const {

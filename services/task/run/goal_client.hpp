@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "idl/types/result.hpp"
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/reader.hpp"
 #include "services/wire/dds/topics.hpp"
@@ -22,6 +23,9 @@ namespace jostle::task {
 class GoalClient {
  public:
   using Clock = std::chrono::steady_clock;
+  /// A coordinator takes a goal up, and sends its result, within moments.
+  static constexpr std::chrono::seconds kIdlePatience{10};
+
   struct Listener {
     std::function<void(const jostle_msgs::msg::Feedback&)> on_feedback;  ///< of this goal; may be empty
     std::function<void(const std::string&)> on_notice;                   ///< the coordinator's trouble; may be empty
@@ -51,6 +55,11 @@ class GoalClient {
   bool send(jostle_msgs::msg::Goal goal, std::uint64_t coordinator);
   bool is_sent() const { return sent_; }
 
+  /// Whether the coordinator is, or was until a moment ago, at work on the goal, by its feedback.
+  /// Errors   unavailable: it has been idle, done, or at work on something else for kIdlePatience and no result came;
+  ///                       the goal was lost on its way there, or the result on its way back
+  Result<void> check_at_work() const;
+
   /// Waits for the result of this goal; nothing if `deadline` or a stop comes first.
   std::optional<jostle_msgs::msg::GoalResult> wait(Clock::time_point deadline, std::stop_token stop);
 
@@ -58,12 +67,16 @@ class GoalClient {
   void cancel();
 
  private:
+  void note_work(const jostle_msgs::msg::Feedback& feedback);
+
   const std::string goal_id_;
   const Listener listener_;
   bool sent_ = false;
   std::uint64_t coordinator_ = 0;  // its participant, once the goal was sent
   std::string trouble_;            // the coordinator's newest
   std::optional<Clock::time_point> coordinator_heard_, world_heard_, others_heard_;
+  std::optional<Clock::time_point> idle_since_;  // the coordinator, as far as this goal is concerned
+  bool taken_up_ = false;                        // the coordinator spoke of the goal
 
   wire::Writer<jostle_msgs::msg::Goal> goal_;
   wire::Writer<jostle_msgs::msg::Cancel> cancel_;

@@ -56,6 +56,7 @@ Result<jostle_msgs::msg::GoalResult> follow(GoalClient& client, common::LiveLine
     if (auto result = client.wait(Clock::now() + kTick, stop)) return *std::move(result);
     client.listen();
     if (stop.stop_requested()) break;
+    if (auto ok = client.check_at_work(); !ok) return ok.error();
     const auto now = Clock::now();
     if (client.coordinators().empty()) {
       return Error{Code::kUnavailable, "the coordinator is gone; whether the robot stands still is for you to see"};

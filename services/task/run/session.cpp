@@ -287,6 +287,9 @@ Result<void> Session::look_after() {
                     "the network, and fewer --workers leave it more of a busy machine",
                     kLongSilence.count())};
   }
+  if (auto ok = client_.check_at_work(); !ok) {
+    return Error{ok.error().code, fmt::format("{}\n{}", ok.error().message, coordinator_process_->last_words())};
+  }
   for (common::ChildProcess& worker : workers_) {
     const auto ended = worker.ended();
     if (!ended) continue;

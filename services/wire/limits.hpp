@@ -61,6 +61,11 @@ inline constexpr std::int64_t kNumberLeap = std::int64_t{1} << 20;
 inline constexpr std::int64_t kNumbersPerSecond = 1'000'000;
 /// Writers whose numbers are remembered; others are judged as if they were heard for the first time.
 inline constexpr std::size_t kWritersRemembered = 8192;
+/// How long a participant that was not heard before, or for as long, may show from which ports it sends; later its name
+/// is worth nothing from another. Ports of one participant, and participants whose ports are remembered.
+inline constexpr std::chrono::seconds kShowsItsPorts{5};
+inline constexpr std::size_t kPortsOfOne = 16;
+inline constexpr std::size_t kParticipantsRemembered = 4096;
 /// Bytes of a sample that comes in fragments, and into how many it may be cut.
 inline constexpr std::uint32_t kFragmentedSample = std::uint32_t{1} << 28;
 inline constexpr std::uint32_t kFragments = std::uint32_t{1} << 18;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <optional>
+#include <utility>
 
 #include "idl/types/hash.hpp"
 #include "services/wire/limits.hpp"
@@ -30,10 +31,9 @@ enum Kind : std::uint8_t {
 constexpr std::size_t kHeader = 20;  // bytes: "RTPS", version, vendor, prefix of the GUID
 constexpr std::size_t kVendor = 6;
 constexpr std::size_t kPrefix = 8;
-constexpr std::size_t kPrefixSize = 12;
 constexpr std::uint32_t kMostBits = 256;  // of a set of numbers
-// Silent writers are forgotten when the table is full.
-constexpr std::chrono::seconds kSilent{10};
+// Who is silent is forgotten when a table is full.
+constexpr std::chrono::seconds kSilent{10}, kLook{1};
 
 // One submessage, its header read.
 struct Submessage {
@@ -126,33 +126,40 @@ const char* to_string(Flaw flaw) {
       return "it has a sequence number that its writer cannot have reached";
     case Flaw::kFragments:
       return "it is a fragment of a sample larger than any";
+    case Flaw::kImpostor:
+      return "the participant whose name it bears sends from other ports";
   }
   return "";
 }
 
-std::size_t Judge::HashGuid::operator()(const Guid& guid) const {
-  return hash_of(std::string_view(reinterpret_cast<const char*>(guid.data()), guid.size())).low;
+std::size_t Judge::HashBytes::operator()(Bytes bytes) const {
+  return hash_of(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size())).low;
 }
 
-Flaw Judge::judge(Bytes datagram, TimePoint now) {
+Flaw Judge::judge(Bytes datagram, std::uint16_t port, TimePoint now) {
   if (datagram.size() < kHeader || std::memcmp(datagram.data(), "RTPS", 4) != 0) return Flaw::kMalformed;
   if (is_of_fast_dds(datagram) && !(statistics_come_last(datagram, 1) && statistics_come_last(datagram, 4))) {
     return Flaw::kStatistics;
   }
   Guid writer{};
-  const auto take_prefix = [&](Bytes from) { std::copy_n(from.begin(), kPrefixSize, writer.begin()); };
-  take_prefix(datagram.subspan(kPrefix));
+  const auto speaks_as = [&](Bytes from) {
+    Prefix prefix;
+    std::copy_n(from.begin(), prefix.size(), prefix.begin());
+    std::ranges::copy(prefix, writer.begin());
+    return is_its_own(prefix, port, now);
+  };
+  if (!speaks_as(datagram.subspan(kPrefix))) return Flaw::kImpostor;
   for (std::size_t at = kHeader; at < datagram.size();) {
     const auto submessage = submessage_at(datagram, at);
     if (!submessage || submessage->body.size() < least_size(submessage->kind)) return Flaw::kMalformed;
     const Submessage& part = *submessage;
     const auto is_plausible = [&](std::size_t place_of_writer, std::int64_t number, std::int64_t left_out = 0) {
-      std::copy_n(part.body.begin() + static_cast<std::ptrdiff_t>(place_of_writer), 4, writer.begin() + kPrefixSize);
+      std::copy_n(part.body.begin() + static_cast<std::ptrdiff_t>(place_of_writer), 4, writer.end() - 4);
       return plausible(writer, number, left_out, now);
     };
     switch (part.kind) {
       case kInfoSource:
-        take_prefix(part.body.subspan(8));
+        if (!speaks_as(part.body.subspan(8))) return Flaw::kImpostor;
         break;
       case kData:
         if (!is_plausible(8, part.sequence(12))) return Flaw::kNumber;
@@ -195,6 +202,32 @@ Flaw Judge::judge(Bytes datagram, TimePoint now) {
   return Flaw::kNone;
 }
 
+template <class Name, class Value>
+void Judge::Heard<Name, Value>::add(const Name& name, Value value, TimePoint now) {
+  if (all_.size() >= most_ && now - looked_ >= kLook) {
+    looked_ = now;
+    std::erase_if(all_, [&](const auto& entry) { return entry.second.heard + kSilent < now; });
+  }
+  if (all_.size() < most_) all_.emplace(name, std::move(value));
+}
+
+bool Judge::is_its_own(const Prefix& participant, std::uint16_t port, TimePoint now) {
+  const std::lock_guard lock(mutex_);
+  Ports* const found = participants_.find(participant);
+  if (!found) {
+    participants_.add(participant, {.known = {port}, .shows_since = now, .heard = now}, now);
+    return true;
+  }
+  Ports& ports = *found;
+  if (std::ranges::find(ports.known, port) == ports.known.end()) {
+    if (now - ports.heard >= limits::kShowsItsPorts) ports.shows_since = now;
+    if (now - ports.shows_since >= limits::kShowsItsPorts || ports.known.size() >= limits::kPortsOfOne) return false;
+    ports.known.push_back(port);
+  }
+  ports.heard = now;
+  return true;
+}
+
 bool Judge::may_begin_at(std::int64_t number, TimePoint now) {
   if (number <= limits::kNumberLeap) return true;  // costs next to nothing
   first_budget_ =
@@ -208,16 +241,13 @@ bool Judge::may_begin_at(std::int64_t number, TimePoint now) {
 bool Judge::plausible(const Guid& writer, std::int64_t number, std::int64_t left_out, TimePoint now) {
   if (number < 0) return false;
   const std::lock_guard lock(mutex_);
-  const auto found = writers_.find(writer);
-  if (found == writers_.end()) {
+  Progress* const found = writers_.find(writer);
+  if (!found) {
     if (!may_begin_at(std::max(number, left_out), now)) return false;
-    if (writers_.size() >= limits::kWritersRemembered) forget_silent(now);
-    if (writers_.size() < limits::kWritersRemembered) {
-      writers_.emplace(writer, Progress{.number = number, .budget = limits::kNumberLeap, .heard = now});
-    }
+    writers_.add(writer, {.number = number, .budget = limits::kNumberLeap, .heard = now}, now);
     return true;
   }
-  Progress& progress = found->second;
+  Progress& progress = *found;
   progress.budget =
       std::min(progress.budget, limits::kNumberLeap) + grown(now - progress.heard, limits::kNumbersPerSecond);
   progress.heard = now;
@@ -226,10 +256,6 @@ bool Judge::plausible(const Guid& writer, std::int64_t number, std::int64_t left
   progress.budget -= price;
   progress.number = std::max(progress.number, number);
   return true;
-}
-
-void Judge::forget_silent(TimePoint now) {
-  std::erase_if(writers_, [&](const auto& entry) { return entry.second.heard + kSilent < now; });
 }
 
 }  // namespace jostle::wire

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <span>
 #include <unordered_map>
+#include <vector>
 
 #include "services/wire/dds/guid.hpp"
 #include "services/wire/limits.hpp"
@@ -20,7 +21,8 @@ enum class Flaw {
   kMalformed,   ///< no RTPS, or a part that is longer than what is left or shorter than it must be
   kStatistics,  ///< a submessage of the middleware's statistics that is not the last
   kNumber,      ///< a sequence number that its writer cannot have reached, or a range that it cannot have left out
-  kFragments    ///< of a sample larger, or cut into more pieces, than there are
+  kFragments,   ///< of a sample larger, or cut into more pieces, than there are
+  kImpostor     ///< in the name of a participant that sends from other ports
 };
 
 /// Returns a flaw in words, for a log.
@@ -34,12 +36,18 @@ const char* to_string(Flaw flaw);
 /// What is encrypted as a whole (protected domains) is only seen as such: its numbers were written by somebody who has
 /// the key. What a stranger sends to a protected domain is not encrypted, and is judged.
 ///
+/// Who forges the numbers of a writer makes its readers deaf to it, by numbers that are not absurd. A participant sends
+/// from the same few ports as long as it lives, and a stranger cannot see which; so once it has shown them, what comes
+/// in its name from other ports is dropped. That keeps out who comes later and does not listen to the wire; for
+/// everybody else there are protected domains.
+///
 /// Threads  safe from any thread: each socket has one of its own.
 class Judge {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  Flaw judge(std::span<const std::uint8_t> datagram, TimePoint now);
+  /// `port`: the sender's.
+  Flaw judge(std::span<const std::uint8_t> datagram, std::uint16_t port, TimePoint now);
 
  private:
   /// A writer's number so far, and how far it may go at once.
@@ -48,16 +56,40 @@ class Judge {
     std::int64_t budget = 0;
     TimePoint heard;
   };
-  struct HashGuid {
-    std::size_t operator()(const Guid& guid) const;
+  /// A participant's prefix of GUIDs, as whom a datagram may speak.
+  using Prefix = std::array<std::uint8_t, 12>;
+  /// From where a participant has spoken, and since when it may show more of its ports.
+  struct Ports {
+    std::vector<std::uint16_t> known;
+    TimePoint shows_since, heard;
+  };
+  struct HashBytes {
+    std::size_t operator()(std::span<const std::uint8_t> bytes) const;
   };
 
+  /// Who was heard, up to so many. When it is full the silent ones are forgotten, looked for once a second.
+  template <class Name, class Value>
+  class Heard {
+   public:
+    explicit Heard(std::size_t most) : most_(most) {}
+    Value* find(const Name& name) {
+      const auto found = all_.find(name);
+      return found == all_.end() ? nullptr : &found->second;
+    }
+    void add(const Name& name, Value value, TimePoint now);
+
+   private:
+    std::size_t most_;
+    TimePoint looked_;
+    std::unordered_map<Name, Value, HashBytes> all_;
+  };
+
+  bool is_its_own(const Prefix& participant, std::uint16_t port, TimePoint now);
   bool may_begin_at(std::int64_t number, TimePoint now);
   bool plausible(const Guid& writer, std::int64_t number, std::int64_t left_out, TimePoint now);
-  void forget_silent(TimePoint now);
-
   std::mutex mutex_;  // guards everything below
-  std::unordered_map<Guid, Progress, HashGuid> writers_;
+  Heard<Guid, Progress> writers_{limits::kWritersRemembered};
+  Heard<Prefix, Ports> participants_{limits::kParticipantsRemembered};
   std::int64_t first_budget_ = limits::kFirstNumber;  // of numbers of writers that are heard for the first time
   TimePoint first_heard_;
 };

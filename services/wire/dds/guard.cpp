@@ -42,7 +42,7 @@ class GuardedTransport final : public ChainingTransport {
 
   void receive(TransportReceiverInterface* next, const octet* data, std::uint32_t size, const Locator_t& local,
                const Locator_t& remote) override {
-    const Flaw flaw = judge_.judge({data, size}, std::chrono::steady_clock::now());
+    const Flaw flaw = judge_.judge({data, size}, IPLocator::getPhysicalPort(remote), std::chrono::steady_clock::now());
     if (flaw == Flaw::kNone) return next->OnDataReceived(data, size, local, remote);
     dropped_.warn("a datagram of {} bytes from {} was dropped: {}", size, IPLocator::ip_to_string(remote),
                   to_string(flaw));

@@ -14,6 +14,7 @@
 #include "services/wire/dds/raw.hpp"
 #include "services/wire/dds/system_topics.hpp"
 #include "services/wire/dds/topics.hpp"
+#include "services/wire/limits.hpp"
 #include "tests/fuzz/wire/mutation.hpp"
 #include "tests/support/program_process.hpp"
 #include "tests/support/scenes.hpp"
@@ -30,6 +31,8 @@ constexpr auto kPatience = 60s;
 constexpr std::size_t kMostGrowth = 300;  // MB
 constexpr std::size_t kKept = 8;          // samples of a topic to spoil
 constexpr int kBurst = 100;               // between two breaths
+// ms; from then on a forged datagram is known by its port.
+constexpr int kAcquaintance = static_cast<int>(std::chrono::milliseconds(wire::limits::kShowsItsPorts).count()) + 1000;
 
 struct Options {
   long samples = 2000, datagrams = 5000;
@@ -168,6 +171,7 @@ class Fuzzer {
   }
 
   void send_datagrams() {
+    poll(nullptr, 0, kAcquaintance);
     std::vector<Bytes> seeds;
     {
       const std::lock_guard lock(mutex_);

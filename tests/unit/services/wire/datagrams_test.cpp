@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <map>
 #include <random>
 #include <vector>
@@ -91,11 +92,27 @@ Bytes fragments(std::uint16_t piece, std::uint32_t sample) {
 
 Bytes statistics(std::size_t size = 56) { return submessage(0x80, Bytes(size, 0)); }
 
+constexpr std::uint16_t kPort = 41000;
+
+Bytes info_source(std::uint8_t who) {
+  Bytes body{0, 0, 0, 0, 2, 3, 1, 15};
+  body.resize(20, who);
+  return submessage(0x0c, body);
+}
+
 class Datagrams : public ::testing::Test {
  protected:
-  Flaw judge(const Bytes& parts, std::uint8_t who = 1) {
+  Flaw judge(const Bytes& parts, std::uint8_t who = 1, std::uint16_t port = kPort) {
     Bytes datagram = header(who);
-    return sut.judge(datagram += parts, now);
+    return sut.judge(datagram += parts, port, now);
+  }
+
+  // Somebody's first words, from all of its ports, and time passes.
+  void is_known(std::uint8_t who, std::initializer_list<std::uint16_t> ports) {
+    for (const std::uint16_t port : ports) ASSERT_EQ(judge(data(1), who, port), Flaw::kNone) << port;
+    now += limits::kShowsItsPorts - 1s;
+    for (const std::uint16_t port : ports) ASSERT_EQ(judge(data(1), who, port), Flaw::kNone) << port;
+    now += 1s;
   }
 
   Judge sut;
@@ -125,8 +142,8 @@ TEST_F(Datagrams, WithStatisticsThatAreNotTheLastAreDropped) {
 }
 
 TEST_F(Datagrams, ThatAreNoneOrCutAreDropped) {
-  EXPECT_EQ(sut.judge({}, now), Flaw::kMalformed);
-  EXPECT_EQ(sut.judge(Bytes(100, 'x'), now), Flaw::kMalformed);
+  EXPECT_EQ(sut.judge({}, kPort, now), Flaw::kMalformed);
+  EXPECT_EQ(sut.judge(Bytes(100, 'x'), kPort, now), Flaw::kMalformed);
   for (const Bytes& whole : {data(1), heartbeat(1, 5), gap(1, 2), fragments(1000, 5000)}) {
     for (std::size_t size = 1; size < whole.size(); ++size) {
       EXPECT_NE(judge(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size))), Flaw::kNone) << size;
@@ -187,6 +204,33 @@ TEST_F(Datagrams, WithFragmentsOfGiantsAreDropped) {
   EXPECT_EQ(judge(fragments(0, 1000)), Flaw::kFragments);
 }
 
+TEST_F(Datagrams, InTheNameOfSomebodyWhoSendsFromElsewhereAreDropped) {
+  is_known(1, {kPort, kPort + 1});
+
+  EXPECT_EQ(judge(data(2), 1, kPort + 2), Flaw::kImpostor);
+  Bytes hidden = info_source(1);
+  EXPECT_EQ(judge(hidden += data(2), 2, kPort + 2), Flaw::kImpostor);
+  EXPECT_EQ(judge(data(2), 1, kPort), Flaw::kNone);
+  EXPECT_EQ(judge(data(3), 1, kPort + 1), Flaw::kNone);
+  EXPECT_EQ(judge(data(1), 2, kPort + 2), Flaw::kNone) << "another participant's ports are its own";
+}
+
+// A network between may give whoever was silent another port.
+TEST_F(Datagrams, OfSomebodyWhoWasSilentForLongMayComeFromElsewhere) {
+  is_known(1, {kPort});
+  ASSERT_EQ(judge(data(2), 1, kPort + 1), Flaw::kImpostor);
+
+  now += limits::kShowsItsPorts;
+
+  EXPECT_EQ(judge(data(2), 1, kPort + 1), Flaw::kNone);
+  EXPECT_EQ(judge(data(3), 1, kPort), Flaw::kNone) << "it has both now";
+}
+
+TEST_F(Datagrams, OfWhoShowsCountlessPortsAreDroppedFromTheRest) {
+  for (std::uint16_t i = 0; i < limits::kPortsOfOne; ++i) ASSERT_EQ(judge(data(1), 1, kPort + i), Flaw::kNone);
+  EXPECT_EQ(judge(data(1), 1, kPort - 1), Flaw::kImpostor);
+}
+
 // For the sanitizers: what is read lies in the datagram.
 TEST_F(Datagrams, ThatAreSpoiltInAnyWayAreJudged) {
   std::mt19937_64 random(1);
@@ -195,11 +239,20 @@ TEST_F(Datagrams, ThatAreSpoiltInAnyWayAreJudged) {
   std::map<Flaw, int> judged;
   for (int i = 0; i < 100'000; ++i) {
     const Bytes spoilt = tests::mutated(whole, random() % 4 == 0 ? 0 : 20, random);
-    ++judged[sut.judge(std::vector<std::uint8_t>(spoilt), now)];
+    ++judged[sut.judge(std::vector<std::uint8_t>(spoilt), kPort, now)];
   }
   for (const Flaw flaw : {Flaw::kNone, Flaw::kMalformed, Flaw::kStatistics, Flaw::kNumber, Flaw::kFragments}) {
     EXPECT_GT(judged[flaw], 0) << to_string(flaw);
   }
+}
+
+TEST_F(Datagrams, OfCountlessParticipantsTakeNoMemoryForEver) {
+  Bytes datagram = header();
+  for (std::uint32_t i = 0; i < 10 * limits::kParticipantsRemembered; ++i) {
+    std::memcpy(datagram.data() + 8, &i, sizeof i);
+    ASSERT_EQ(sut.judge(datagram, kPort, now), Flaw::kNone);
+  }
+  ASSERT_EQ(sut.judge(datagram, kPort + 1, now += 2 * limits::kShowsItsPorts), Flaw::kNone) << "was not remembered";
 }
 
 TEST_F(Datagrams, OfCountlessWritersTakeNoMemoryForEver) {

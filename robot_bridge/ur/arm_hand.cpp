@@ -54,6 +54,14 @@ std::string ArmHand::trouble() {
   return gripper_ && !fingers_.is_ready ? fingers_.trouble : "";
 }
 
+ArmHand::Condition ArmHand::condition() {
+  refresh();
+  Condition condition{.arm = report_, .arm_trouble = arm_.trouble(), .calibration = arm_.calibration(), .gripper = {}};
+  if (condition.arm_trouble.empty() && !report_.is_ready) condition.arm_trouble = "the arm is not ready";
+  if (gripper_) condition.gripper = fingers_;
+  return condition;
+}
+
 Result<RobotReading> ArmHand::read(std::stop_token stop) {
   if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped on request"};
   refresh();

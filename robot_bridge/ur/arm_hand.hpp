@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,14 @@ class ArmHand final : public Robot {
 
   /// Says what keeps it from moving; "" if nothing does.
   std::string trouble();
+  /// How arm and gripper are, for those who look after them.
+  struct Condition {
+    PlanarArm::Report arm;
+    std::string arm_trouble;  ///< "" if there is none
+    std::optional<CalibrationError> calibration;
+    std::optional<robotiq::Client::Report> gripper;  ///< nothing if there is none
+  };
+  Condition condition();
   /// Returns the arm's sample that the last reading was made of, which may be old: see ArmState::received.
   const ArmState& arm_state() const { return report_.state; }
 

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -68,12 +69,12 @@ class ArmCommands : public ArmParts {
   }
 
   // What the robot says of a failure.
-  std::string error() {
+  Error error() {
     const auto deadline = Clock::now() + kPatience;
     while (const auto status = statuses->take(deadline)) {
-      if (!status->error().empty()) return status->error();
+      if (!status->error().empty()) return {static_cast<Code>(status->error_code()), status->error()};
     }
-    return "nothing";
+    return {Code::kInternal, "nothing"};
   }
 
   std::unique_ptr<wire::Participant> participant;
@@ -96,7 +97,9 @@ TEST_P(ArmCommands_Bad, StopTheMovingArmWithin200Milliseconds) {
   ASSERT_TRUE(commands->write(bad));
   const double said = onlooker->next().time;
   EXPECT_LT(time_to_stand(said), 0.2) << bridge->err();
-  EXPECT_THAT(error(), HasSubstr(GetParam().error));
+  const Error told = error();
+  EXPECT_EQ(told.code, Code::kInvalidArgument);
+  EXPECT_THAT(told.message, HasSubstr(GetParam().error));
   expect_to_stand();
 }
 
@@ -117,8 +120,33 @@ TEST_F(ArmCommands, ThatAreLateStopTheMovingArmWithin200Milliseconds) {
   repeats = {};
   const double last = onlooker->next().time;
   EXPECT_LT(time_to_stand(last), 0.2) << bridge->err();
-  EXPECT_THAT(error(), HasSubstr("was not heard for 60 ms"));
+  const Error told = error();
+  EXPECT_EQ(told.code, Code::kUnavailable);
+  EXPECT_THAT(told.message, HasSubstr("was not heard for 60 ms"));
   expect_to_stand();  // what comes late is not obeyed
+}
+
+// As rqt_robot_monitor shows it.
+TEST_F(ArmCommands, DiagnosticsTellHowArmAndGripperAre) {
+  ASSERT_NO_FATAL_FAILURE(begin_moving());
+  wire::Inbox<diagnostic_msgs::msg::DiagnosticArray> diagnostics(*participant, wire::topics::kDiagnostics, 16);
+  const auto message = diagnostics.take(Clock::now() + kPatience);
+  ASSERT_TRUE(message);
+  ASSERT_EQ(message->status().size(), 2u);
+  EXPECT_GT(message->header().stamp().sec(), 1'600'000'000);
+  for (const auto& status : message->status()) {
+    EXPECT_EQ(status.level(), diagnostic_msgs::msg::DiagnosticStatus_Constants::OK) << status.message();
+    EXPECT_EQ(status.message(), "ready");
+    EXPECT_EQ(status.hardware_id(), address);
+  }
+  std::map<std::string, std::string> values;
+  for (const auto& value : message->status().front().values()) values[value.key()] = value.value();
+  EXPECT_EQ(message->status().front().name(), "ur5: arm");
+  EXPECT_EQ(values["robot mode"], "RUNNING");
+  EXPECT_EQ(values["safety mode"], "NORMAL");
+  EXPECT_EQ(values["program"], "running");
+  EXPECT_EQ(values["calibration: hand off by, mm"], "0.00") << "the simulated arm is as drawn";
+  EXPECT_EQ(message->status().back().name(), "ur5: gripper");
 }
 
 }  // namespace

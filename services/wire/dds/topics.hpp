@@ -18,6 +18,9 @@ inline const Topic<tf2_msgs::msg::TFMessage> kTransforms{"rt/tf", kState};
 inline const Topic<geometry_msgs::msg::PoseArray> kObjectPoses{"rt/objects/poses", kState};
 inline const Topic<msg::ObjectStates> kObjectStates{"rt/objects/states", kState};
 
+/// How a robot's parts are; a bridge says it once a second.
+inline const Topic<diagnostic_msgs::msg::DiagnosticArray> kDiagnostics{"rt/diagnostics", kState};
+
 inline const Topic<msg::VelocityCommand> kRobotCommand{"rt/robot/command", kCommand};
 inline const Topic<msg::RobotStatus> kRobotStatus{"rt/robot/status", kState};
 
@@ -44,9 +47,9 @@ inline const Topic<rosgraph_msgs::msg::Clock> kClock{"rt/clock", kState};
 
 /// Returns all of the above, in their order.
 inline auto all() {
-  return std::tie(kJointStates, kTransforms, kObjectPoses, kObjectStates, kRobotCommand, kRobotStatus, kTaskGoal,
-                  kTaskCancel, kTaskRun, kTaskObservation, kTaskPlan, kTaskFeedback, kTaskResult, kPoolWorker,
-                  kPoolWorld, kPoolControl, kPoolResult, kPlayControl, kPlayStatus, kClock);
+  return std::tie(kJointStates, kTransforms, kObjectPoses, kObjectStates, kDiagnostics, kRobotCommand, kRobotStatus,
+                  kTaskGoal, kTaskCancel, kTaskRun, kTaskObservation, kTaskPlan, kTaskFeedback, kTaskResult,
+                  kPoolWorker, kPoolWorld, kPoolControl, kPoolResult, kPlayControl, kPlayStatus, kClock);
 }
 
 /// Returns the topic on which one worker gets its assignments. On a shared topic each assignment would reach

@@ -4,6 +4,7 @@
 
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
+#include "idl/msg/diagnosticsPubSubTypes.h"
 #include "idl/msg/playPubSubTypes.h"
 #include "idl/msg/poolPubSubTypes.h"
 #include "idl/msg/robotPubSubTypes.h"
@@ -22,6 +23,7 @@ struct SerializerOf;
     using type = package::msg::name##PubSubType; \
   };
 
+JOSTLE_WIRE_TYPE(diagnostic_msgs, DiagnosticArray)
 JOSTLE_WIRE_TYPE(geometry_msgs, PoseArray)
 JOSTLE_WIRE_TYPE(rosgraph_msgs, Clock)
 JOSTLE_WIRE_TYPE(sensor_msgs, JointState)

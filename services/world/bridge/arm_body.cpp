@@ -7,11 +7,13 @@
 
 #include "physics_pool/robot/robot_yaml.hpp"
 #include "services/world/arm/arm_scene.hpp"
+#include "services/world/bridge/arm_diagnostics.hpp"
 
 namespace jostle::world {
 namespace {
 
 constexpr auto kTick = std::chrono::milliseconds(2);  // the fastest controllers' cycle
+constexpr auto kDiagnosticsEvery = std::chrono::seconds(1);
 constexpr const char* kJointNames[] = {"shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
                                        "wrist_1_joint",      "wrist_2_joint",       "wrist_3_joint"};
 
@@ -25,8 +27,13 @@ physics_pool::RobotModel arm_model() {
 }  // namespace
 
 ArmBody::ArmBody(const wire::Participant& participant, robot_bridge::ur::ArmHand& hand, robot_bridge::Robot& robot,
-                 const robot_bridge::planar::Mounting& mounting, std::chrono::milliseconds patience)
-    : hand_(hand), robot_(robot), patience_(patience), arm_(participant, arm_model(), pose_of(mounting.base), {}) {}
+                 const robot_bridge::planar::Mounting& mounting, std::chrono::milliseconds patience, std::string host)
+    : hand_(hand),
+      robot_(robot),
+      patience_(patience),
+      host_(std::move(host)),
+      arm_(participant, arm_model(), pose_of(mounting.base), {}),
+      diagnostics_(participant, wire::topics::kDiagnostics) {}
 
 Result<void> ArmBody::begin(std::span<const double> u, double duration) {
   auto ok = robot_.start(u, duration);
@@ -64,6 +71,14 @@ Result<bool> ArmBody::rest() {
 robot_bridge::RobotReading ArmBody::reading() {
   if (auto reading_result = robot_.read()) reading_ = std::move(reading_result).value();
   return reading_;
+}
+
+void ArmBody::publish() {
+  tell_joints();
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_diagnostics_) return;
+  next_diagnostics_ = now + kDiagnosticsEvery;
+  (void)diagnostics_.write(diagnostics_of(hand_.condition(), host_, reading().stamp));
 }
 
 void ArmBody::tell_joints() {

@@ -80,7 +80,7 @@ int main(int argc, char** argv) {
     robot_bridge::ur::ArmHand hand(arm, client ? &*client : nullptr);
     robot_bridge::Guard guard(hand, arm_guard(hand, arm_options, scene.fixtures));
     ArmBody body(*participant_result, hand, guard, arm_options.mounting,
-                 std::chrono::milliseconds(std::lround(1e3 * silence)));
+                 std::chrono::milliseconds(std::lround(1e3 * silence)), arm_options.host);
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience);
     std::string said;
     for (std::string trouble; !(trouble = hand.trouble()).empty();) {

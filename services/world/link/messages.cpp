@@ -189,6 +189,19 @@ Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotSta
                                     .object_in_hand = in_hand_from(message.in_hand())};
 }
 
+void put_error(const std::optional<Error>& error, jostle_msgs::msg::RobotStatus& message) {
+  message.error(error ? error->message : "");
+  message.error_code(error ? static_cast<std::uint8_t>(error->code) : std::uint8_t{0});
+}
+
+std::optional<Error> error_of(const jostle_msgs::msg::RobotStatus& message) {
+  if (message.error().empty()) return {};
+  if (message.error_code() > static_cast<std::uint8_t>(Code::kInternal)) return Error{Code::kInternal, message.error()};
+  const auto code = static_cast<Code>(message.error_code());
+  const bool is_its_own = code == Code::kDeadline || code == Code::kCancelled;
+  return Error{is_its_own ? Code::kUnavailable : code, message.error()};
+}
+
 jostle_msgs::msg::Observation to_message(const Seen& seen, double time) {
   jostle_msgs::msg::Observation message;
   message.header(make_header(time));

@@ -44,6 +44,11 @@ std::optional<bool> in_hand_from(std::uint8_t in_hand);
 /// Error kInvalidArgument naming the field.
 Result<robot_bridge::RobotReading> from_message(const jostle_msgs::msg::RobotStatus& message);
 
+/// Puts an error into a status, and takes it out again: nothing while all is well. A deadline or a cancellation of the
+/// robot's is none of its commander's, and arrives as kUnavailable; a code that is none as kInternal.
+void put_error(const std::optional<Error>& error, jostle_msgs::msg::RobotStatus& message);
+std::optional<Error> error_of(const jostle_msgs::msg::RobotStatus& message);
+
 /// What a controller sees at a time.
 struct Seen {
   robot_bridge::RobotReading robot;

@@ -79,7 +79,7 @@ std::optional<Error> RobotServer::interrupted(const Action& action) {
     if (stops) {
       why = Error{Code::kCancelled, "told to stop"};
     } else if (const auto harm = body_.patience() ? harm_of(command, action) : std::nullopt) {
-      if (!why) why = Error{Code::kUnavailable, *harm + "; the motion was ended"};
+      if (!why) why = Error{Code::kInvalidArgument, *harm + "; the motion was ended"};
       if (command.epoch() != epoch_) continue;  // who means it says it again, to a robot that stands
     }
     waiting_.push_back(std::move(letter));
@@ -160,19 +160,20 @@ void RobotServer::obey(const jostle_msgs::msg::VelocityCommand& command) {
   if (is_stop(command)) {
     finished_ = accepted_;
     actions_.clear();
-    error_.clear();
+    error_.reset();
     publish();
     return;
   }
   const auto check_result = robot_bridge::check_command(command.velocities(), limits_, command.duration());
   if (!check_result) {
-    error_ = fmt::format("command {}: {}", command.sequence_number(), check_result.error().message);
+    error_ = Error{check_result.error().code,
+                   fmt::format("command {}: {}", command.sequence_number(), check_result.error().message)};
     if (actions_.empty()) finished_ = accepted_;  // nobody waits for an earlier one
-    refused_.note("{}; refused", error_);
+    refused_.note("{}; refused", error_->message);
     publish();
     return;
   }
-  error_.clear();
+  error_.reset();
   actions_.push_back({.epoch = command.epoch(),
                       .sequence_number = command.sequence_number(),
                       .u = command.velocities(),
@@ -184,10 +185,10 @@ Result<void> RobotServer::act(const Action& action, std::stop_token stop) {
   auto moved = move(action, std::move(stop));
   busy_ = false;
   finished_ = action.sequence_number;
-  if (!moved) error_ = moved.error().message;
+  if (!moved) error_ = moved.error();
   if (!moved && moved.error().code == Code::kInternal) return moved;
   if (!moved) {
-    refused_.note("command {}/{} ended early: {}", action.epoch, action.sequence_number, error_);
+    refused_.note("command {}/{} ended early: {}", action.epoch, action.sequence_number, error_->message);
     actions_.clear();  // they counted on this one
     finished_ = accepted_;
   }
@@ -242,7 +243,7 @@ void RobotServer::publish() {
   status.sequence_number(finished_);
   status.busy(busy_ || !actions_.empty());
   status.in_hand(in_hand_message(reading.object_in_hand));
-  status.error(error_);
+  put_error(error_, status);
   status.q(reading.q);
   status.v(reading.v);
   status.limits(limits_);

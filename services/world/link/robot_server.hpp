@@ -116,7 +116,7 @@ class RobotServer {
   common::Trouble refused_{"refused commands"};
   common::Trouble foreign_{"commands of others"};
   bool busy_ = false;
-  std::string error_;
+  std::optional<Error> error_;  // of the newest command; nothing while all is well
   std::chrono::steady_clock::time_point next_publication_;
   std::chrono::steady_clock::time_point heard_;  // the commander, while a motion is at work
 

@@ -115,10 +115,12 @@ Result<bool> RobotClient::hear_of(const jostle_msgs::msg::VelocityCommand& comma
   repeat_if_at_work(*status_result);
   if (status_result->epoch() == epoch_) {
     const bool finished = status_result->sequence_number() >= command.sequence_number();
-    const std::string error = common::shown(status_result->error(), wire::limits::kShownError);
-    if (!error.empty() && (finished || error != refusal_)) {  // else it is an earlier command's
-      refusal_ = error;
-      return Error{Code::kInvalidArgument, "robot: " + error};
+    if (const auto error = error_of(*status_result)) {
+      const std::string words = common::shown(error->message, wire::limits::kShownError);
+      if (finished || words != refusal_) {  // else it is an earlier command's
+        refusal_ = words;
+        return Error{error->code, "robot: " + words};
+      }
     }
     if (finished) return true;
   }

@@ -37,5 +37,31 @@ TEST(HandMessage, NumbersAreThoseOfOldBags) {
   EXPECT_EQ(hand::CANNOT_TELL, 2);
 }
 
+TEST(StatusError, CrossesWithItsCode) {
+  jostle_msgs::msg::RobotStatus status;
+  put_error(Error{Code::kUnavailable, "protective stop"}, status);
+  ASSERT_TRUE(error_of(status));
+  EXPECT_EQ(error_of(status)->code, Code::kUnavailable);
+  EXPECT_EQ(error_of(status)->message, "protective stop");
+  put_error({}, status);
+  EXPECT_FALSE(error_of(status));
+}
+
+// A commander ends its task when its own time is over, or when it is told to; not when its robot says so.
+TEST(StatusError, DeadlinesAndCancellationsOfARobotAreNotItsCommanders) {
+  for (const Code code : {Code::kDeadline, Code::kCancelled}) {
+    jostle_msgs::msg::RobotStatus status;
+    put_error(Error{code, "late"}, status);
+    EXPECT_EQ(error_of(status)->code, Code::kUnavailable);
+  }
+}
+
+TEST(StatusError, WithACodeThatIsNoneIsInternal) {
+  jostle_msgs::msg::RobotStatus status;
+  status.error("what?");
+  status.error_code(200);
+  EXPECT_EQ(error_of(status)->code, Code::kInternal);
+}
+
 }  // namespace
 }  // namespace jostle::world

@@ -91,17 +91,21 @@ bool Estimator::apply(State& state, const Event& event) const {
   return true;
 }
 
-double Estimator::distance(const Track& track, const Event& event) const {
+Estimator::Match Estimator::match(const Track& track, const Event& event) {
   const auto next =
       std::ranges::upper_bound(track.steps, event.time, {}, [](const Step& step) { return step.event.time; });
   State state = next == track.steps.begin() ? track.steps.front().after : std::prev(next)->after;
   state.predict(event.time);
-  double least = std::numeric_limits<double>::infinity();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Match best{kInfinity, -kInfinity};
   for (const Hypothesis& hypothesis : state.hypotheses) {
-    for (const Candidate& candidate : event.candidates)
-      least = std::min(least, hypothesis.filter.distance(candidate.pose));
+    for (const Candidate& candidate : event.candidates) {
+      PoseFilter filter = hypothesis.filter;
+      best.distance = std::min(best.distance, filter.distance(candidate.pose));
+      best.log_likelihood = std::max(best.log_likelihood, filter.update(candidate.pose) - candidate.surprise / 2);
+    }
   }
-  return least;
+  return best;
 }
 
 // Puts an event in its place. Returns whether there was one.
@@ -167,14 +171,19 @@ void Estimator::doubt(Track& track, Event event) {
 // Sightings that are where another object is expected, while their own is expected elsewhere or was not seen for a
 // while.
 void Estimator::sort_out(double time, std::vector<Place>& places) {
-  const auto is_out = [&](const Place& place) { return place.distance > options_.gate; };
+  const auto is_out = [&](const Place& place) { return place.own.distance > options_.gate; };
+  // Where it is expected says more than where it may have moved to, which after a pause is nearly anywhere.
+  const auto is_rather = [&](const Track& other, const Place& place) {
+    const Match there = match(other, place.event);
+    return there.distance <= options_.gate && (is_out(place) || there.log_likelihood > place.own.log_likelihood);
+  };
   std::vector<Track*> owners(places.size(), nullptr);
   for (std::size_t i = 0; i < places.size(); ++i) {
     Track* const own = places[i].track;
     owners[i] = own;
     if (!is_out(places[i]) && time - own->steps.back().after.last_seen <= options_.unseen_after) continue;
     for (auto& [name, other] : tracks_) {
-      if (&other == own || other.believed < 2 || distance(other, places[i].event) > options_.gate) continue;
+      if (&other == own || other.believed < 2 || !is_rather(other, places[i])) continue;
       const auto seen = std::ranges::find(places, &other, &Place::track);
       // A ghost of an object that is there, or that is not seen: nothing is learnt from it.
       owners[i] = seen != places.end() && is_out(*seen) ? &other : nullptr;
@@ -212,8 +221,8 @@ Result<void> Estimator::take(double time, const std::vector<Sighting>& seen) {
       ++counts_.taken;
       continue;
     }
-    const double off = distance(track, *event_result);
-    places.push_back({&track, std::move(event_result).value(), off});
+    const Match own = match(track, *event_result);
+    places.push_back({&track, std::move(event_result).value(), own});
   }
   sort_out(time, places);
   return result;

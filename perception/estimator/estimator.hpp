@@ -117,16 +117,20 @@ class Estimator {
     std::vector<Event> strays;  // that were not believed, newest last
     int believed = 1;           // 2: twice or more
   };
+  struct Match {                  // of an event with a track
+    double distance = 0.0;        // the least of any hypothesis and candidate
+    double log_likelihood = 0.0;  // the most
+  };
   struct Place {  // of a sighting in its frame
     Track* track = nullptr;
     Event event;
-    double distance = 0.0;
+    Match own;
   };
 
   static Result<Event> checked(double time, const Sighting& sighting);
   State begun(const Event& event) const;
   bool apply(State& state, const Event& event) const;
-  double distance(const Track& track, const Event& event) const;
+  static Match match(const Track& track, const Event& event);
   bool insert(Track& track, Event event);
   void sort_out(double time, std::vector<Place>& places);
   void believe(Track& track, Event event);

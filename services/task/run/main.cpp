@@ -110,10 +110,11 @@ int main(int argc, char** argv) {
                  "--objects: got " + objects + ", wanted sim or mocap-sim: the arm's world is simulated"},
                 common::kExitUsage);
   }
-  if (options.sensor.kind == Sensor::Kind::kCameraSim && options.arm.kind != Arm::Kind::kSim) {
-    return fail({Code::kInvalidArgument,
-                 "--objects: got camera-sim with --arm " + arm + ", wanted --arm sim: only its world is rendered"},
-                common::kExitUsage);
+  if (options.sensor.kind == Sensor::Kind::kCameraSim && options.arm.kind == Arm::Kind::kUr) {
+    return fail(
+        {Code::kInvalidArgument, "--objects: got camera-sim with --arm " + arm +
+                                     ", wanted --arm sim or ur-sim: only the world of a simulated arm is rendered"},
+        common::kExitUsage);
   }
   if (options.sensor.kind == Sensor::Kind::kCameraSim && arguments.level != "none") {
     return fail({Code::kInvalidArgument, "--uncertainty: got " + arguments.level +

@@ -1,8 +1,10 @@
 #include "services/world/perceive/camera.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <vector>
@@ -10,6 +12,7 @@
 #include "idl/types/transform.hpp"
 #include "perception/tags/detector.hpp"
 #include "perception/tags/pose.hpp"
+#include "physics_pool/render/picture.hpp"
 #include "physics_pool/scene/scene.hpp"
 #include "services/common/process/trouble.hpp"
 #include "services/wire/dds/camera_topics.hpp"
@@ -57,14 +60,39 @@ perception::Sighting sighting(const ObjectTag& tag, const perception::PoseEstima
   return sighting;
 }
 
+void draw_line(physics_pool::Picture& picture, const perception::Pixel& from, const perception::Pixel& to) {
+  constexpr std::array<std::uint8_t, 3> kGreen{0, 220, 0};
+  const int steps = 1 + static_cast<int>(std::max(std::abs(to.x - from.x), std::abs(to.y - from.y)));
+  for (int i = 0; i <= steps; ++i) {
+    const double share = static_cast<double>(i) / steps;
+    const auto x = std::lround(from.x + share * (to.x - from.x)), y = std::lround(from.y + share * (to.y - from.y));
+    if (x < 0 || y < 0 || x >= picture.width || y >= picture.height) continue;
+    std::ranges::copy(kGreen, picture.rgb.begin() + 3 * (y * picture.width + x));
+  }
+}
+
+physics_pool::Picture with_outlines(const perception::GreyImage& image,
+                                    const std::vector<perception::Detection>& detections) {
+  physics_pool::Picture picture{.width = image.width, .height = image.height};
+  picture.rgb.reserve(3 * image.pixels.size());
+  for (const std::uint8_t shade : image.pixels) picture.rgb.insert(picture.rgb.end(), 3, shade);
+  for (const perception::Detection& detection : detections) {
+    for (std::size_t i = 0; i < 4; ++i) draw_line(picture, detection.corners[i], detection.corners[(i + 1) % 4]);
+  }
+  return picture;
+}
+
 // Finds tags in images.
 class Looker {
  public:
   Looker(std::vector<ObjectTag> tags, const Pose& X_WC) : tags_(std::move(tags)), X_WC_(transform(X_WC)) {}
 
-  std::vector<perception::Sighting> look(const perception::Camera& camera, const perception::GreyImage& image) {
+  std::vector<perception::Detection> detect(const perception::GreyImage& image) { return detector_.detect(image); }
+
+  std::vector<perception::Sighting> sightings_of(const perception::Camera& camera,
+                                                 const std::vector<perception::Detection>& detections) {
     std::vector<perception::Sighting> sightings;
-    for (const perception::Detection& detection : detector_.detect(image)) {
+    for (const perception::Detection& detection : detections) {
       const auto tag = std::ranges::find(tags_, detection.id, &ObjectTag::id);
       if (tag == tags_.end()) continue;
       const perception::TagView view{.corners = detection.corners, .size = tag->size, .X_BT = tag->X_BT};
@@ -99,6 +127,8 @@ Result<void> look_through_camera(const wire::Participant& participant, const Cam
   common::Trouble bad("bad messages of the camera");
   std::optional<perception::Camera> camera;
   std::uint64_t frames = 0;
+  perception::GreyImage last;
+  std::vector<perception::Detection> found_last;
   spdlog::info("looking at {}/image_raw, domain {}", options.name, participant.domain());
   while (!stop.stop_requested()) {
     auto image = images.take(Clock::now() + kTick, stop);
@@ -110,7 +140,7 @@ Result<void> look_through_camera(const wire::Participant& participant, const Cam
         bad.warn("{}", camera_result.error().message);
     }
     if (!image || !camera) continue;
-    const auto image_result = from_message(*image);
+    auto image_result = from_message(*image);
     if (!image_result) {
       bad.warn("{}", image_result.error().message);
       continue;
@@ -121,12 +151,16 @@ Result<void> look_through_camera(const wire::Participant& participant, const Cam
       continue;
     }
     if (frames++ == 0) spdlog::info("frames come from {}", options.name);
-    sight.look(seconds(image->header()), looker.look(*camera, *image_result));
+    found_last = looker.detect(*image_result);
+    sight.look(seconds(image->header()), looker.sightings_of(*camera, found_last));
     sight.say_unseen();
+    last = std::move(image_result).value();
   }
   spdlog::info("{} frames, {} bad messages", frames, bad.count());
   sight.say_counts();
-  return {};
+  if (options.snapshot.empty()) return {};
+  if (frames == 0) return Error{Code::kIo, fmt::format("{}: no image came", options.snapshot.string())};
+  return physics_pool::write_png(options.snapshot, with_outlines(last, found_last));
 }
 
 }  // namespace jostle::world

@@ -17,10 +17,12 @@ struct CameraOptions {
   std::string name = "camera";  ///< images come on NAME/image_raw, intrinsics on NAME/camera_info
   std::filesystem::path scene;  ///< whose objects have tags as tags_of() says
   std::optional<Pose> X_WC;     ///< where the camera is; nothing: overhead()
+  /// PNG of the last image, written at the end, in which tags that were found are outlined; empty: none.
+  std::filesystem::path snapshot;
 };
 
 /// Publishes where the objects are, as Sight does, once for each image, until a stop is requested.
-/// Errors   those of load_scene() and tags_of()
+/// Errors   those of load_scene() and tags_of(); kIo: the snapshot cannot be written, or there was no image
 Result<void> look_through_camera(const wire::Participant& participant, const CameraOptions& options,
                                  std::stop_token stop);
 

@@ -104,6 +104,8 @@ int main(int argc, char** argv) {
                    "Where the camera is in the world: x y z (m) and the quaternion w x y z; z looks forward, y down\n"
                    "(default: above the middle of the surface, as the simulated camera)")
       ->expected(7);
+  camera->add_option("--snapshot", camera_options.snapshot,
+                     "PNG of the last image with the tags that were found in it outlined, written at the end");
   common::add_process_options(*camera, process);
   app.footer("Exit codes: 0 stopped by a signal, 2 bad input, 3 a part of the system failed.");
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;

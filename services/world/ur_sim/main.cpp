@@ -20,6 +20,7 @@
 #include "services/common/process/command_line.hpp"
 #include "services/common/process/program.hpp"
 #include "services/world/arm/arm_scene.hpp"
+#include "services/world/camera/camera_out.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 #include "services/world/link/objects_out.hpp"
 #include "services/world/ur_sim/plant.hpp"
@@ -33,28 +34,31 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto kEyes = std::chrono::milliseconds(10);            // between two measurements of the objects
 constexpr auto kStandardForms = std::chrono::milliseconds(100);  // and between two as ROS 2's tools want them
+constexpr auto kPictures = std::chrono::milliseconds(200);       // each costs some 0.1 s of a core
 
 // What cameras would see of the objects, stamped with the time of day.
 class Eyes {
  public:
-  explicit Eyes(ObjectsOut& objects) : objects_(objects) {}
+  Eyes(ObjectsOut& objects, Clock::duration pause) : pause_(pause), objects_(objects) {}
 
   void look(const physics_pool::ExecutionWorld& world) {
     const auto now = Clock::now();
     if (now < next_) return;
-    next_ = now + kEyes;
+    next_ = now + pause_;
     const std::chrono::duration<double> time = std::chrono::system_clock::now().time_since_epoch();
+    objects_.show(world.state(), time.count());
     objects_.tell(object_readings(world.world().geometry().layout, world.state()), time.count());
   }
 
  private:
+  const Clock::duration pause_;
   Clock::time_point next_{};
   ObjectsOut& objects_;
 };
 
 struct Options {
   std::string scene_file, address = "127.0.0.1", generation = "cb3", mocap;
-  bool has_eyes = true;
+  bool has_eyes = true, has_camera = false;
   std::uint16_t pendant = 0;  // port; 0: none
 };
 
@@ -165,11 +169,19 @@ int main(int argc, char** argv) {
       "--pendant", options.pendant,
       "Port that takes lines: protective stop, emergency stop, restart safety, reboot, remote, local (default: none)");
   auto* no_eyes = app.add_flag("!--no-eyes", options.has_eyes, "Do not publish where the objects are");
-  app.add_option(
-         "--mocap", options.mocap,
-         "IPv4 address at which a simulated motion capture sees the objects, instead of publishing where they are "
-         "(NatNet; `jostle perceive mocap` reads it)")
-      ->excludes(no_eyes);
+  auto* mocap =
+      app.add_option(
+             "--mocap", options.mocap,
+             "IPv4 address at which a simulated motion capture sees the objects, instead of publishing where they are "
+             "(NatNet; `jostle perceive mocap` reads it)")
+          ->excludes(no_eyes);
+  app.add_flag(
+         "--camera", options.has_camera,
+         "Render what a camera above the surface sees of the arm, the objects and their tags, five times a second,\n"
+         "as /camera/image_raw and /camera/camera_info (`jostle perceive camera` looks at it), instead of\n"
+         "publishing where the objects are")
+      ->excludes(no_eyes)
+      ->excludes(mocap);
   common::add_process_options(app, process);
   app.footer(
       "Ports: 29999 dashboard, 30001 primary, 30002 secondary, 30004 RTDE, 63352 gripper.\n"
@@ -206,10 +218,16 @@ int main(int argc, char** argv) {
           {.name = "jostle_ur_sim", .domain = process.domain, .role = wire::Role::kRobot, .waits_for_server = true});
       if (!participant_result) return fail(participant_result.error());
       participant.emplace(*participant_result);
-      objects = std::make_unique<ObjectTopics>(*participant, kStandardForms);
+      if (options.has_camera) {
+        auto tags_result = tags_of(*arm_result);
+        if (!tags_result) return fail(tags_result.error());
+        objects = std::make_unique<CameraOut>(*participant, *arm_result, std::move(tags_result).value(), 0);
+      } else {
+        objects = std::make_unique<ObjectTopics>(*participant, kStandardForms);
+      }
     }
     std::optional<Eyes> eyes;
-    if (objects) eyes.emplace(*objects);
+    if (objects) eyes.emplace(*objects, options.has_camera ? kPictures : kEyes);
     spdlog::info("{} ready at {}: scene '{}'", kind.model, options.address, scene_result->name);
     if (auto ok = machine.run(eyes ? &*eyes : nullptr, signal.token()); !ok) return fail(ok.error());
     return common::kExitOk;

@@ -196,6 +196,26 @@ TEST(Estimator, AGhostOnAnotherObjectIsNotBelievedHoweverLong) {
   EXPECT_FALSE(sut.at(3.0).at(0).seen);
 }
 
+// Between two images of a slow camera anything may have moved to where anything else is; that is no reason to doubt
+// what is seen where it was.
+TEST(Estimator, SlowFramesOfObjectsSideBySideAreBelieved) {
+  Sensor sensor(0.001, 21);
+  Estimator sut;
+  const auto name = [](int i) { return "box" + std::to_string(i); };
+  const auto place = [](int i) { return Vector3d(0.1 * (i % 3), 0.1 * (i / 3), 0.02); };
+  for (int frame = 0; frame < 30; ++frame) {
+    std::vector<Sighting> seen;
+    for (int i = 0; i < 9; ++i) seen.push_back(sensor.see(name(i), place(i)));
+    ASSERT_TRUE(sut.take(frame * 0.7, seen));
+  }
+  EXPECT_EQ(sut.counts().taken, 30u * 9u);
+  EXPECT_EQ(sut.counts().outliers, 0u);
+  EXPECT_EQ(sut.counts().swapped, 0u);
+  const auto estimates = sut.at(29 * 0.7);
+  ASSERT_THAT(estimates, SizeIs(9));
+  for (int i = 0; i < 9; ++i) EXPECT_LT((position(estimates[static_cast<std::size_t>(i)]) - place(i)).norm(), 0.002);
+}
+
 TEST(Estimator, WhatWasCarriedAwayIsBelievedOnceSightingsAgree) {
   Sensor sensor(0.005, 8);
   Estimator sut;

@@ -5,12 +5,14 @@
 #include "idl/types/transform.hpp"
 #include "perception/tags/detector.hpp"
 #include "perception/tags/pose.hpp"
+#include "services/world/arm/arm_scene.hpp"
 #include "services/world/camera/camera_out.hpp"
 #include "services/world/camera/messages.hpp"
 
 namespace jostle::world {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 physics_pool::Scene two_objects() {
@@ -74,6 +76,24 @@ TEST(SimulatedCamera, ImagesTellWhereObjectsAre) {
     EXPECT_NEAR(X_WB.position[2], object.rest_height(), 0.01);
     EXPECT_NEAR(yaw_of(X_WB.orientation.data()), object.yaw, 0.02);
   }
+}
+
+TEST(SimulatedCamera, AnArmHidesWhatIsBelowIt) {
+  const auto found_with_hand_at = [](double x) {
+    physics_pool::Scene scene = two_objects();
+    scene.robot = physics_pool::planar_gripper({.x = x, .opening = 0.085});
+    scene.objects[0].x = 0.01, scene.objects[0].y = 0.0;
+    scene.objects[1].y = -0.2;
+    const physics_pool::Scene shown = with_arm(scene, {}).value();
+    const auto tags = tags_of(shown).value();
+    const auto image = perception::SceneCamera(simulated_camera())
+                           .render(view_of(shown, tags, initial_state(shown), overhead(shown)), 1);
+    std::vector<int> ids;
+    for (const perception::Detection& detection : perception::Detector().detect(image)) ids.push_back(detection.id);
+    return ids;
+  };
+  EXPECT_THAT(found_with_hand_at(-0.33), ElementsAre(0, 1));
+  EXPECT_THAT(found_with_hand_at(0.2), ElementsAre(1));  // the box is below the wrist
 }
 
 TEST(CameraMessages, ColoursBecomeGreyAndRowsMayBePadded) {

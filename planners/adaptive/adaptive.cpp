@@ -1,9 +1,8 @@
 #include "planners/adaptive/adaptive.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include "physics_pool/objective/scorer.hpp"
+#include <functional>
 
 namespace jostle::planners {
 namespace {
@@ -23,29 +22,22 @@ class Run {
  private:
   Result<void> adapt() {
     if (auto ok = execution_.observe(); !ok) return ok;
-    for (ControlSequence left; !is_over(); left = execution_.plan().controls) {
+    for (ControlSequence left; !execution_.is_over(options_.max_actions); left = execution_.plan().controls) {
       if (execution_.has_planned()) ++execution_.outcome().replans;
-      if (auto ok = execution_.plan(left, options_.iterations, objective_); !ok) return ok;
+      if (auto ok = execution_.plan(request(left)); !ok) return ok;
       if (options_.plan_only) return conclude_plan();
-      if (auto ok = execution_.act(); !ok) return ok;
-      if (auto ok = execution_.rest(options_.rest); !ok) return ok;
+      if (auto ok = execution_.act(options_.rest, std::bind_front(&Run::next, this)); !ok) return ok;
     }
     return {};
   }
 
-  bool is_over() {
-    Outcome& outcome = execution_.outcome();
-    const physics_pool::TaskGeometry& geometry = setup_.geometry;
-    if (!outcome.dropped.empty()) {
-      outcome.conclude(Ending::kFailed, fmt::format("dropped {}", fmt::join(outcome.dropped, ", ")));
-    } else if (const std::string failure = geometry.kind->failure(geometry, execution_.x()); !failure.empty()) {
-      outcome.conclude(Ending::kFailed, failure);
-    } else if (physics_pool::at_goal(geometry, execution_.x(), setup_.objective)) {
-      outcome.conclude(Ending::kSucceeded, geometry.kind->achieved);
-    } else if (outcome.actions >= options_.max_actions) {
-      outcome.conclude(Ending::kFailed, fmt::format("not there after {} actions", outcome.actions));
-    }
-    return outcome.is_over();
+  PlanRequest request(const ControlSequence& left) const {
+    return {.initial = left, .iterations = options_.iterations, .objective = objective_};
+  }
+
+  std::optional<PlanRequest> next(const State& x, const Plan& left) const {
+    if (execution_.will_be_over(x, options_.max_actions)) return {};
+    return request(left.controls);
   }
 
   Result<void> conclude_plan() {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "physics_pool/objective/scorer.hpp"
@@ -57,7 +58,7 @@ class Run {
   // Alg. 2.
   Result<void> online() {
     if (auto ok = observe(); !ok) return ok;
-    if (auto ok = plan(straight(), options_.many_iterations); !ok) return ok;
+    if (auto ok = execution_.plan(whole_plan(x())); !ok) return ok;
     for (;;) {
       if (auto over_result = over(); !over_result)
         return over_result.error();
@@ -68,35 +69,49 @@ class Run {
       } else {
         replans_in_a_row_ = 0;
       }
-      if (auto ok = act(); !ok) return ok;
+      if (auto ok = act(&Run::next_of_online); !ok) return ok;
     }
   }
 
-  // Lines 8 to 10.
   bool needs_replan() const {
     const Plan& plan = execution_.plan();
     if (execution_.plan_is_fresh()) return plan.controls.steps() == 0;
-    const bool deviated = state_deviation(layout(), plan.states.front(), x()) > options_.deviation_threshold;
-    const bool few_left = plan.controls.steps() < std::max(options_.min_steps, 1);
-    return !plan.at_goal || deviated || few_left;
+    return needs_replan(x(), plan);
   }
 
-  // Lines 11 and 12. Where the last plan fell short of the target the horizon
-  // is filled up again, so that there is time to go round, and the iterations
-  // grow.
+  // Lines 8 to 10, after an action that came to x.
+  bool needs_replan(const State& x, const Plan& left) const {
+    const bool deviated = state_deviation(layout(), left.states.front(), x) > options_.deviation_threshold;
+    const bool few_left = left.controls.steps() < std::max(options_.min_steps, 1);
+    return !left.at_goal || deviated || few_left;
+  }
+
   Result<void> replan() {
-    const Plan& before = execution_.plan();
-    const int wanted =
-        before.at_goal ? before.controls.steps() + 1 : std::max(before.controls.steps() + 1, options_.initial_steps);
-    ControlSequence controls = before.controls;
-    while (controls.steps() < wanted) controls.append(straight_step(before.states.back()));
     ++execution_.outcome().replans;
+    const PlanRequest request = next_plan(x(), execution_.plan());
     ++replans_in_a_row_;
-    const bool lost = before.cost >= setup_.objective.weight("drop") && setup_.objective.weight("drop") > 0;
-    if (auto ok = plan(lost || must_clear_hand() ? back_off() : controls, replan_iterations_); !ok) return ok;
+    if (auto ok = execution_.plan(request); !ok) return ok;
     replan_iterations_ = execution_.plan().at_goal ? options_.few_iterations
                                                    : std::min(2 * replan_iterations_, options_.few_iterations_max);
     return {};
+  }
+
+  // Lines 11 and 12, one more re-plan in a row. Where the last plan fell short of the target the horizon
+  // is filled up again, so that there is time to go round, and the iterations
+  // grow.
+  PlanRequest next_plan(const State& x, const Plan& left) const {
+    const int wanted =
+        left.at_goal ? left.controls.steps() + 1 : std::max(left.controls.steps() + 1, options_.initial_steps);
+    ControlSequence controls = left.controls;
+    while (controls.steps() < wanted) controls.append(straight_step(left.states.back()));
+    const bool must_clear = must_clear_hand(x, replans_in_a_row_ + 1);
+    const bool lost = left.cost >= setup_.objective.weight("drop") && setup_.objective.weight("drop") > 0;
+    return request(lost || must_clear ? back_off(x) : controls, replan_iterations_, must_clear);
+  }
+
+  std::optional<PlanRequest> next_of_online(const State& x, const Plan& left) const {
+    if (will_be_over(x) || !needs_replan(x, left)) return {};
+    return next_plan(x, left);
   }
 
   // Alg. 3.
@@ -108,24 +123,39 @@ class Run {
       else if (*over_result)
         return conclude();
       if (execution_.has_planned()) ++execution_.outcome().replans;
-      if (auto ok = plan(straight(), options_.many_iterations); !ok) return ok;
+      if (auto ok = execution_.plan(whole_plan(x())); !ok) return ok;
       while (!options_.plan_only && execution_.plan().controls.steps() > 0) {
-        if (auto ok = act(); !ok) return ok;
+        if (auto ok = act(&Run::next_of_naive); !ok) return ok;
       }
     }
   }
 
-  Result<void> plan(const ControlSequence& initial, int iterations) {
-    // What has lodged in the hand counts only once predictions have failed that counted on grasping past it.
-    physics_pool::Objective objective = setup_.objective;
-    if (!must_clear_hand()) objective["obstruction"].weight = 0.0;
-    return execution_.plan(initial, iterations, objective);
+  std::optional<PlanRequest> next_of_naive(const State& x, const Plan& left) const {
+    if (will_be_over(x) || left.controls.steps() > 0) return {};
+    return whole_plan(x);
   }
 
-  Result<void> act() {
-    if (auto ok = execution_.act(); !ok) return ok;
+  PlanRequest whole_plan(const State& x) const {
+    return request(straight_line(setup_.geometry, x, options_.initial_steps, options_.step_duration),
+                   options_.many_iterations, must_clear_hand(x, replans_in_a_row_));
+  }
+
+  PlanRequest request(ControlSequence initial, int iterations, bool must_clear) const {
+    PlanRequest request{.initial = std::move(initial), .iterations = iterations, .objective = setup_.objective};
+    // What has lodged in the hand counts only once predictions have failed that counted on grasping past it.
+    if (!must_clear) request.objective["obstruction"].weight = 0.0;
+    return request;
+  }
+
+  Result<void> act(std::optional<PlanRequest> (Run::*next)(const State&, const Plan&) const) {
+    if (auto ok = execution_.act(0.0, std::bind_front(next, this)); !ok) return ok;
     feel();
     return {};
+  }
+
+  // As far as can be told without a hand that feels.
+  bool will_be_over(const State& x) const {
+    return physics_pool::at_goal(setup_.geometry, x, setup_.objective) || !execution_.dropped_in(x).empty();
   }
 
   Result<void> observe() {
@@ -177,24 +207,19 @@ class Run {
     return {};
   }
 
-  ControlSequence straight() const {
-    return straight_line(setup_.geometry, x(), options_.initial_steps, options_.step_duration);
-  }
-
-  bool must_clear_hand() const {
-    return replans_in_a_row_ > options_.obstruction_patience &&
-           physics_pool::count_obstructions(setup_.geometry, x()) > 0;
+  bool must_clear_hand(const State& x, int replans_in_a_row) const {
+    return replans_in_a_row > options_.obstruction_patience && physics_pool::count_obstructions(setup_.geometry, x) > 0;
   }
 
   // A way out where going on cannot end well: backwards by a finger's length, so
   // that what lodges between the fingers stays behind, then straight again.
-  ControlSequence back_off() const {
+  ControlSequence back_off(const State& x) const {
     const int back = std::max(options_.initial_steps / 3, 1);
     const double speed = hand().finger_length / (back * options_.step_duration);
-    State away = x();
+    State away = x;
     ControlSequence controls{.nu = layout().nu};
     std::vector<double> u = still();
-    const double heading = hand_place(setup_.geometry, x()).heading;
+    const double heading = hand_place(setup_.geometry, x).heading;
     u[axis_x()] = -speed * std::cos(heading);
     u[axis_y()] = -speed * std::sin(heading);
     for (int t = 0; t < back; ++t) controls.append(u);

@@ -1,13 +1,10 @@
 #include "planners/mpc/mpc.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
-
-#include "physics_pool/objective/scorer.hpp"
 
 namespace jostle::planners {
 namespace {
@@ -40,30 +37,37 @@ class Run {
  private:
   Result<void> push() {
     if (auto ok = execution_.observe(); !ok) return ok;
-    for (ControlSequence initial = straight(x(), options_.horizon); !is_over();) {
-      const bool first = !execution_.has_planned();
-      if (!first) ++execution_.outcome().replans;
-      const int iterations = first ? options_.first_iterations : options_.iterations;
-      if (auto ok = execution_.plan(initial, iterations, objective_, u_before_); !ok) return ok;
+    PlanRequest request{.initial = straight(execution_.x(), options_.horizon),
+                        .iterations = options_.first_iterations,
+                        .objective = objective_};
+    while (!execution_.is_over(options_.max_actions)) {
+      if (execution_.has_planned()) ++execution_.outcome().replans;
+      if (auto ok = execution_.plan(request); !ok) return ok;
       if (options_.plan_only) return conclude_plan();
       const auto u = execution_.plan().controls.step(0);
       u_before_.assign(u.begin(), u.end());
-      if (auto ok = execution_.act(); !ok) return ok;
-      initial = warm_start();
+      if (auto ok = execution_.act(0.0, std::bind_front(&Run::next, this)); !ok) return ok;
+      request = warm_start(execution_.x(), execution_.plan());
     }
     return {};
   }
 
+  std::optional<PlanRequest> next(const State& x, const Plan& left) const {
+    if (execution_.will_be_over(x, options_.max_actions)) return {};
+    return warm_start(x, left);
+  }
+
   // What is left of the plan, filled up to the horizon. A plan that has lost the target
   // does not find it again by small changes: then a straight push, from where it is.
-  ControlSequence warm_start() const {
-    const Plan& plan = execution_.plan();
-    if (way_of_target(plan.states) < kLost) return straight(x(), options_.horizon);
-    ControlSequence controls = plan.controls;
-    if (const int missing = options_.horizon - controls.steps(); missing > 0) {
-      controls.append(straight(plan.states.back(), missing).values);
+  PlanRequest warm_start(const State& x, const Plan& left) const {
+    PlanRequest request{
+        .initial = left.controls, .iterations = options_.iterations, .objective = objective_, .u_before = u_before_};
+    if (way_of_target(left.states) < kLost) {
+      request.initial = straight(x, options_.horizon);
+    } else if (const int missing = options_.horizon - left.controls.steps(); missing > 0) {
+      request.initial.append(straight(left.states.back(), missing).values);
     }
-    return controls;
+    return request;
   }
 
   // From first to last, m.
@@ -76,21 +80,6 @@ class Run {
     return straight_push(setup_.geometry, from, steps, options_.step_duration, options_.straight_speed);
   }
 
-  bool is_over() {
-    Outcome& outcome = execution_.outcome();
-    const physics_pool::TaskGeometry& geometry = setup_.geometry;
-    if (!outcome.dropped.empty()) {
-      outcome.conclude(Ending::kFailed, fmt::format("dropped {}", fmt::join(outcome.dropped, ", ")));
-    } else if (const std::string failure = geometry.kind->failure(geometry, x()); !failure.empty()) {
-      outcome.conclude(Ending::kFailed, failure);
-    } else if (physics_pool::at_goal(geometry, x(), setup_.objective)) {
-      outcome.conclude(Ending::kSucceeded, geometry.kind->achieved);
-    } else if (outcome.actions >= options_.max_actions) {
-      outcome.conclude(Ending::kFailed, fmt::format("not in the goal region after {} actions", outcome.actions));
-    }
-    return outcome.is_over();
-  }
-
   Result<void> conclude_plan() {
     if (execution_.plan().at_goal) {
       execution_.outcome().conclude(Ending::kSucceeded, "plan reaches the goal region; not executed");
@@ -99,8 +88,6 @@ class Run {
     }
     return {};
   }
-
-  const State& x() const { return execution_.x(); }
 
   const ControlSetup& setup_;
   const MpcOptions& options_;

@@ -34,7 +34,8 @@ class Run {
       if (auto ok = closed_loop_to_goal(initial); !ok) return ok;
       return conclude();
     }
-    if (auto ok = execution_.plan(initial, options_.iterations, to_goal_); !ok) return ok;
+    if (auto ok = execution_.plan({.initial = initial, .iterations = options_.iterations, .objective = to_goal_}); !ok)
+      return ok;
     if (options_.plan_only) return conclude();
     const Plan plan = execution_.plan();
     const Segment whole{.from = 0, .to = plan.controls.steps(), .is_robust = false, .metric = 0.0};
@@ -100,7 +101,13 @@ class Run {
     const bool is_first = !execution_.has_planned();
     if (!is_first) ++execution_.outcome().replans;
     const int iterations = is_first ? options_.iterations : options_.mpc_iterations;
-    if (auto ok = execution_.plan(controls, iterations, objective, u_before_, false); !ok) return ok;
+    if (auto ok = execution_.plan({.initial = controls,
+                                   .iterations = iterations,
+                                   .objective = objective,
+                                   .u_before = u_before_,
+                                   .weigh_robustness = false});
+        !ok)
+      return ok;
     return options_.plan_only ? Result<void>{} : act();
   }
 

@@ -218,6 +218,11 @@ void add_control(std::vector<ParameterKey>& keys) {
       "Rollouts of all plans together; 0: as many as there is time for. With it a run decides the same "
       "however fast its machines are.",
       [](auto& p) -> auto& { return p.limits.rollouts; }));
+  keys.push_back(key(
+      "control.plan_while_acting", "m", 0, 1e3,
+      "Plans the next action from what the present one is predicted to come to, while the robot acts, and takes that "
+      "plan where robot and objects are observed this near to it. 0: plans while the robot stands still.",
+      [](auto& p) -> auto& { return p.plan_while_acting; }));
 }
 
 void add_mpc(std::vector<ParameterKey>& keys) {

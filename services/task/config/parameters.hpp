@@ -23,6 +23,7 @@ struct Parameters {
   physics_pool::Objective objective = physics_pool::Objective::standard();
   planners::ControllerOptions controller;
   planners::RunLimits limits;
+  double plan_while_acting = 0.0;  ///< m, see ControlSetup
 };
 
 /// Returns `base` with what a file changes. Keys that the file leaves out stay as they are; unknown keys are refused.

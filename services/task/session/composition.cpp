@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <functional>
+
 #include "physics_pool/local/simulator.hpp"
 #include "planners/guided/guided_start.hpp"
 
@@ -43,7 +45,10 @@ Result<planners::Outcome> Composition::perform(robot_bridge::Robot& robot, perce
                                .objective = parts_.parameters.objective,
                                .world = world_,
                                .seed = parts_.seed,
-                               .limits = parts_.parameters.limits};
+                               .limits = parts_.parameters.limits,
+                               .plan_while_acting = parts_.parameters.plan_while_acting,
+                               .on_plan = watch.on_plan};
+  setup.predict = std::bind_front(&Composition::predict, this);
   if (!parts_.belief_is_exact) {
     setup.make_feasible = [this](const State& x) { return moved_apart(x); };
   }
@@ -68,6 +73,31 @@ std::unique_ptr<planners::Planner> Composition::make_planner(const planners::OnP
                                         parameters.controller, on_progress);
   if (!guide) return planner;
   return std::make_unique<planners::GuidedStart>(std::move(guide), std::move(planner));
+}
+
+// As a planner's rollouts of its first step do.
+Result<State> Composition::predict(const planners::ActionAhead& action, planners::TimePoint deadline,
+                                   std::stop_token stop) const {
+  const std::vector<double> none(static_cast<std::size_t>(action.u.nu), 0.0);
+  physics_pool::RolloutBatch batch;
+  batch.world = world_;
+  batch.x0 = action.x;
+  batch.nominal = action.u;
+  batch.u_before = none;
+  batch.step_duration = action.duration;
+  batch.rest = action.rest;
+  batch.law.sigma = none;
+  batch.law.limit = physics_pool::axis_limits(parts_.belief.robot.model);
+  batch.law.seed = parts_.seed;
+  batch.objective = parts_.parameters.objective;
+  batch.stop_losers = false;
+  batch.want_all_trajectories = true;
+  batch.priority = physics_pool::Priority::kUrgent;
+  auto reply_result = pool_->run(batch, deadline, std::move(stop));
+  if (!reply_result) return reply_result.error();
+  physics_pool::RolloutOutcome& outcome = reply_result->outcomes.front();
+  if (outcome.trajectory.size() == 2) return std::move(outcome.trajectory.back());
+  return Error{Code::kInvalidArgument, "x: an action from it diverged: " + outcome.reason};
 }
 
 Result<State> Composition::moved_apart(const State& x) const {

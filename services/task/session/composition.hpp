@@ -42,9 +42,11 @@ class Composition {
   /// Who hears of a run, and who stands around its planner.
   struct Watch {
     planners::OnEvent on_event;
-    planners::OnProgress on_progress;
-    /// What stands between the controller and the planner, such as a journal; empty: nothing.
+    planners::OnProgress on_progress;  ///< called on the thread that plans: the run's, or one beside it
+    /// What stands between the controller and the planner, such as a stopwatch; empty: nothing.
     std::function<std::unique_ptr<planners::Planner>(planners::Planner&)> around_planner;
+    /// See ControlSetup.
+    std::function<void(const planners::Problem&, const planners::Plan&, const planners::PlanOrigin&)> on_plan;
   };
 
   /// Errors   those of the controllers
@@ -64,6 +66,7 @@ class Composition {
   // why.
   std::unique_ptr<planners::Planner> make_planner(const planners::OnProgress& on_progress) const;
   Result<State> moved_apart(const State& x) const;
+  Result<State> predict(const planners::ActionAhead& action, planners::TimePoint deadline, std::stop_token stop) const;
 
   RunParts parts_;
   const planners::ControllerKind* controller_ = nullptr;

@@ -9,7 +9,7 @@ Result<void> take_two_steps(Execution& execution) {
   if (auto ok = execution.observe(); !ok) return ok;
   ControlSequence still{.nu = execution.layout().nu};
   still.values.assign(2 * static_cast<std::size_t>(still.nu), 0.0);
-  if (auto ok = execution.plan(still, 1, execution.objective()); !ok) return ok;
+  if (auto ok = execution.plan({.initial = still, .iterations = 1, .objective = execution.objective()}); !ok) return ok;
   for (int step = 0; step < 2; ++step) {
     if (auto ok = execution.act(); !ok) return ok;
   }

@@ -218,7 +218,7 @@ TEST_F(MpcTest, GivesUpAfterTheLastAction) {
   const Outcome result = outcome();
   EXPECT_FALSE(result.success);
   EXPECT_EQ(result.ending, Ending::kFailed);
-  EXPECT_EQ(result.reason, "not in the goal region after 6 actions");
+  EXPECT_EQ(result.reason, "not there after 6 actions");
   EXPECT_EQ(planner.problems.size(), 6u);
 }
 

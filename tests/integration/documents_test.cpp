@@ -1,5 +1,6 @@
 // Documents that say what the code says are made by the code, and lead where they say.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -7,7 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "services/wire/dds/topics.hpp"
+#include "services/wire/dds/names.hpp"
+#include "services/wire/dds/system_topics.hpp"
 #include "tests/support/program_process.hpp"
 
 namespace jostle::tests {
@@ -60,18 +62,30 @@ TEST(Documents, OfParametersHoldTheTableOfTheCode) {
   EXPECT_THAT(document, HasSubstr(program.out())) << "put what `jostle parameters --markdown` prints there";
 }
 
-TEST(Documents, NameEveryTopic) {
+// What of a topic's row in docs/topics.md follows from the code.
+std::string row_of(const wire::SystemTopic& topic) {
+  return fmt::format("| `{}` | `{}` | {} | {}, {}, {} |", wire::ros_topic(topic.name).value(),
+                     wire::ros_type(topic.type).value(), topic.scope == wire::Scope::kRobot ? "robot" : "domain",
+                     topic.qos.reliable ? "reliable" : "best effort",
+                     topic.qos.latched || topic.qos.retained ? "transient local" : "volatile",
+                     topic.qos.depth == kKeepAll ? "all" : fmt::format("last {}", topic.qos.depth));
+}
+
+TEST(Documents, SayOfEveryTopicWhatTheCodeSays) {
   const std::string document = contents(kSource / "docs" / "topics.md");
-  std::apply(
-      [&](const auto&... topic) {
-        for (const std::string& name : {std::string(topic.name)...}) {
-          const std::string last = name.substr(name.rfind('/') + 1);
-          EXPECT_TRUE(document.find("`/" + name.substr(3) + "`") != std::string::npos ||
-                      document.find("`" + last + "`") != std::string::npos)
-              << name;
-        }
-      },
-      wire::topics::all());
+  for (const wire::SystemTopic& topic : wire::system_topics()) EXPECT_THAT(document, HasSubstr("\n" + row_of(topic)));
+}
+
+// A path of Foxglove's, "/task/feedback.cost", begins with a topic.
+TEST(Documents, OfFoxglovesLayoutNameTopicsThatAreThere) {
+  const std::string layout = contents(kSource / "docs" / "jostle.foxglove.json");
+  std::vector<std::string> topics;
+  for (const wire::SystemTopic& topic : wire::system_topics()) topics.push_back(wire::ros_topic(topic.name).value());
+  static const std::regex name(R"re("(/[a-z_/]+))re");
+  std::size_t named = 0;
+  for (std::sregex_iterator match(layout.begin(), layout.end(), name), end; match != end; ++match, ++named)
+    EXPECT_THAT(topics, ::testing::Contains((*match)[1].str()));
+  EXPECT_GE(named, 8u);
 }
 
 TEST(Documents, LeadWhereTheySay) {

@@ -7,6 +7,7 @@
 #include <sys/resource.h>
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -16,6 +17,7 @@
 #include "services/wire/dds/raw.hpp"
 #include "services/wire/dds/topics.hpp"
 #include "tests/support/bags.hpp"
+#include "tests/support/rover.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -206,6 +208,40 @@ TEST_F(Record, NamesTypesItDoesNotKnowAndLeavesThemOut) {
   ASSERT_TRUE(known.was_received());
   ASSERT_EQ(stop_recorder(), 0);
   EXPECT_THAT(topics_of(bag()), ElementsAre("/y"));
+}
+
+// From the wire into a bag, out of it again, and as JSON: the bag alone says what the type is.
+TEST_F(Record, TakesTypesOfUsersByTheirMsgFiles) {
+  record({"/wheel", "--messages", kMessageFolder});
+  {
+    const auto participant = wire::Participant::open({.domain = domain}).value();
+    wire::RawWriter writer(participant, {"rt/wheel", *wire::wire_type(kWheelType), kDeep});
+    ASSERT_TRUE(writer.wait_for_readers(in(kPatience))) << recorder->err();
+    ASSERT_TRUE(writer.write(wheel()));
+    ASSERT_TRUE(writer.wait_until_received(in(kPatience)));
+  }
+  ASSERT_EQ(stop_recorder(), 0) << recorder->err();
+
+  const auto exported = program("jostle_bag", {"export", bag(), "--json"});
+  ASSERT_EQ(exported->wait(kPatience), 0) << exported->err();
+  EXPECT_EQ(json::parse(exported->out())["message"],
+            json::parse(R"({"header": {"stamp": {"sec": 5, "nanosec": 6}, "frame_id": "a"}, "speed": 1.5,
+                            "treads": [{"wear": 0.25, "codes": [7, 8]}]})"));
+
+  const wire::RawTopic topic{"rt/wheel", *wire::wire_type(kWheelType), kDeep};
+  const auto listener = wire::Participant::open({.domain = domain}).value();
+  std::mutex mutex;
+  std::vector<std::vector<std::byte>> heard;
+  wire::RawReader reader(listener, topic, [&](std::span<const std::byte> bytes, const wire::Origin&) {
+    const std::lock_guard lock(mutex);
+    heard.emplace_back(bytes.begin(), bytes.end());
+  });
+  const auto player = program("jostle_play", {bag(), "--wait-for-subscribers=1"});
+  ASSERT_EQ(player->wait(kPatience), 0) << player->err();
+  EXPECT_TRUE(soon(kPatience, [&] {
+    const std::lock_guard lock(mutex);
+    return heard == std::vector<std::vector<std::byte>>{wheel()};
+  }));
 }
 
 TEST_F(Record, NamesTopicsWhoseWriterOffersWhatNobodyTakes) {

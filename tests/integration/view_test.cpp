@@ -13,6 +13,7 @@
 #include "services/wire/dds/raw.hpp"
 #include "tests/integration/view_client.hpp"
 #include "tests/support/bags.hpp"
+#include "tests/support/rover.hpp"
 #include "tests/support/run_fixture.hpp"
 #include "tests/support/test_domain.hpp"
 
@@ -310,6 +311,23 @@ TEST_F(View, ShowsWhatIsLiveAsItIsOnTheWire) {
   EXPECT_EQ(text_of(viewer.next_sample().sample()), "abc");  // kept for whoever subscribes later
   viewing->signal(SIGINT);
   EXPECT_EQ(viewing->wait(kPatience), 0) << viewing->err();
+}
+
+TEST_F(View, ShowsTypesOfUsersByTheirMsgFiles) {
+  const auto viewing = program("jostle_view", {"--port", "0", "--messages", kMessageFolder});
+  ASSERT_TRUE(viewing->says("ready", kPatience)) << viewing->err();
+  ViewClient viewer(port_in(viewing->err()));
+  const auto participant = taken(wire::Participant::open({.domain = domain}));
+  wire::RawWriter writer(participant,
+                         {wire::wire_topic("/wheel"), *wire::wire_type(kWheelType), {.latched = true, .depth = 1}});
+  ASSERT_TRUE(writer.write(wheel()));
+
+  const auto channel = viewer.channel("/wheel");
+  viewer.subscribe(0, channel["id"].get<std::uint32_t>());
+
+  EXPECT_EQ(viewer.next_sample().sample(), wheel());
+  EXPECT_EQ(channel["schemaName"], kWheelType);
+  EXPECT_THAT(channel["schema"].get<std::string>(), HasSubstr("MSG: rover_msgs/Tread"));
 }
 
 TEST_F(View, LastsAsLongAsTheRunThatWantsIt) {

@@ -161,13 +161,13 @@ struct Subscriptions::Impl {
                        state->topic.type, keyed ? "has a key" : "should have a key"));
       return nullptr;
     }
-    auto definition = options.definition(state->topic.type);
-    if (!definition) {
-      warn(wire_name + wire_type,
-           fmt::format("{}: the definition of type {} is unknown; left out", state->topic.name, state->topic.type));
+    auto definition_result = options.definition(state->topic.type);
+    if (!definition_result) {
+      warn(wire_name + wire_type, fmt::format("{}: the definition of type {} is unknown; left out: {}",
+                                              state->topic.name, state->topic.type, definition_result.error().message));
       return nullptr;
     }
-    state->topic.definition = *std::move(definition);
+    state->topic.definition = std::move(definition_result).value();
     const std::lock_guard lock(mutex);
     state->index = static_cast<int>(states.size());
     states.push_back(std::move(state));

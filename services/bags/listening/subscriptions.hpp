@@ -33,8 +33,8 @@ class Subscriptions {
     std::string name = "jostle_record";  ///< of the participant, as tools list it
     std::optional<int> domain;
     Selection selection;
-    /// Returns the text of a type such as "jostle_msgs/msg/Goal", or nothing if it is unknown.
-    std::function<std::optional<std::string>(const std::string& type)> definition;
+    /// Returns the text of a type such as "jostle_msgs/msg/Goal". An error says why there is none.
+    std::function<Result<std::string>(const std::string& type)> definition;
     /// Called on the middleware's threads, maybe on several at once. `topic` is an index for topic().
     std::function<void(int topic, std::span<const std::byte>, const wire::Origin&)> on_sample;
     /// Called on a thread of this class.

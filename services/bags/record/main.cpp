@@ -20,7 +20,7 @@ using namespace jostle;
 using namespace jostle::bags;
 
 struct Arguments {
-  std::vector<std::string> topics, excluded;
+  std::vector<std::string> topics, excluded, messages;
   std::string folder, storage = "mcap", json;
   bool no_compress = false;
   double ring = 0.0, duration = 0.0, split_time = 0.0;  // s
@@ -183,6 +183,10 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", arguments.folder, "Folder of the bag (default: record_ and date and time)");
   app.add_option("--exclude", arguments.excluded,
                  "Globs of topics to leave out (default: /pool/*, unless topics are given)");
+  app.add_option("--messages", arguments.messages,
+                 "Folder with .msg files of types of your own, FOLDER/pkg/msg/Name.msg; may be given again\n"
+                 "(AMENT_PREFIX_PATH is looked through, too)")
+      ->allow_extra_args(false);
   app.add_option("--storage", arguments.storage, "mcap, or sqlite3 for tools that read nothing else")
       ->capture_default_str()
       ->check(CLI::IsMember({"mcap", "sqlite3"}));
@@ -217,6 +221,12 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "jostle record: {}\n", ok.error().message);
     return common::exit_code_of(ok.error());
   }
+  auto messages_result = message_files(arguments.messages);
+  if (!messages_result) {
+    fmt::print(stderr, "jostle record: {}\n", messages_result.error().message);
+    return common::exit_code_of(messages_result.error());
+  }
+  options.messages = std::move(messages_result).value();
   common::die_with_parent(process.parent);
   options.domain = process.domain;
   options.folder = arguments.folder.empty() ? now_as("record_%Y_%m_%d-%H_%M_%S") : arguments.folder;

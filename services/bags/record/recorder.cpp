@@ -10,7 +10,6 @@
 #include <cstring>
 #include <utility>
 
-#include "services/bags/format/definitions.hpp"
 #include "services/wire/dds/names.hpp"
 #include "services/wire/dds/topics.hpp"
 
@@ -91,7 +90,8 @@ Result<std::unique_ptr<Recorder>> Recorder::start(RecordOptions options, Watcher
   auto subscriptions_result = Subscriptions::open(
       {.domain = own.domain,
        .selection = own.selection,
-       .definition = [](const std::string& type) { return definition_of(type); },
+       .definition = [self =
+                          recorder.get()](const std::string& type) { return self->options_.messages.definition(type); },
        .on_sample = [self = recorder.get()](int topic, std::span<const std::byte> data,
                                             const wire::Origin& origin) { self->on_sample(topic, data, origin); },
        .on_warning = recorder->watcher_.on_warning});

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "services/bags/format/bag_writer.hpp"
+#include "services/bags/format/message_files.hpp"
 #include "services/bags/listening/record_clock.hpp"
 #include "services/bags/listening/subscriptions.hpp"
 #include "services/bags/record/sample_queue.hpp"
@@ -33,7 +34,8 @@ struct RecordOptions {
   std::chrono::nanoseconds duration{0};  ///< the recording ends after it; 0: never by itself
   bool until_result = false;             ///< it ends shortly after a task's result
   std::optional<int> domain;
-  Note note;  ///< stored as "record"
+  MessageFiles messages{};  ///< definitions beside the bag format's own
+  Note note;                ///< stored as "record"
 };
 
 struct TopicCount {

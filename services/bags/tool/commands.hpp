@@ -33,10 +33,11 @@ int recover_bag(const RecoverArguments& arguments, std::stop_token stop);
 
 struct ExportArguments {
   std::filesystem::path bag;
-  bool as_csv = false;              ///< else JSON, an object per line
-  std::vector<std::string> topics;  ///< patterns of the shell; all if empty
-  std::optional<double> from, to;   ///< s since the bag's start
-  std::string output;               ///< CSV: a folder; JSON: a file; "-": standard output
+  bool as_csv = false;                ///< else JSON, an object per line
+  std::vector<std::string> topics;    ///< patterns of the shell; all if empty
+  std::vector<std::string> messages;  ///< folders with definitions that the bag does not bring
+  std::optional<double> from, to;     ///< s since the bag's start
+  std::string output;                 ///< CSV: a folder; JSON: a file; "-": standard output
 };
 /// Writes decoded messages. kExitFailed if some could not be decoded; the others are written. Leaves nothing behind
 /// when it is interrupted or cannot write.

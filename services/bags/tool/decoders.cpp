@@ -4,7 +4,7 @@
 
 namespace jostle::bags {
 
-Decoders::Decoders(const BagInfo& info) {
+Decoders::Decoders(const BagInfo& info, const MessageFiles& messages) {
   for (const TopicInfo& topic : info.topics) {
     names_.push_back(topic.topic.name);
     reasons_.emplace_back();
@@ -17,11 +17,12 @@ Decoders::Decoders(const BagInfo& info) {
     }
     const std::string type = ros_type_name(topic.topic.type);
     const bool brings_own = topic.topic.has_message_definition();
-    const std::optional<std::string> definition = brings_own ? topic.topic.definition : definition_of(type);
+    const Result<std::string> definition =
+        brings_own ? Result<std::string>(topic.topic.definition) : messages.definition(type);
     if (!definition) {
       reasons_.back() = topic.topic.definition.empty()
-                            ? fmt::format("{}: got no definition of {} in the bag, and none is known", topic.topic.name,
-                                          topic.topic.type)
+                            ? fmt::format("{}: got no definition of {} in the bag, and none is known: {}",
+                                          topic.topic.name, topic.topic.type, definition.error().message)
                             : fmt::format("{}: got a definition of {} written as '{}', wanted 'ros2msg'",
                                           topic.topic.name, topic.topic.type, topic.topic.schema);
       continue;

@@ -9,14 +9,15 @@
 
 #include "services/bags/format/bag_reader.hpp"
 #include "services/bags/format/definitions.hpp"
+#include "services/bags/format/message_files.hpp"
 
 namespace jostle::bags {
 
 class Decoders {
  public:
-  /// Makes decoders from the bag's own definitions; from ours where it brings none. A definition that is
+  /// Makes decoders from the bag's own definitions; from `messages` where it brings none. A definition that is
   /// malformed is as good as none.
-  explicit Decoders(const BagInfo& info);
+  explicit Decoders(const BagInfo& info, const MessageFiles& messages = MessageFiles());
 
   bool has(int topic) const { return decoders_.at(static_cast<std::size_t>(topic)).has_value(); }
   /// Why a topic has none.

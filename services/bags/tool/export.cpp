@@ -336,10 +336,12 @@ Result<void> export_csv(BagReader& reader, const Decoders& decoders, const Selec
 }  // namespace
 
 int export_bag(const ExportArguments& arguments, std::stop_token stop) {
+  const auto messages_result = message_files(arguments.messages);
+  if (!messages_result) return fail(messages_result.error(), common::kExitUsage);
   const auto reader_result = open_bag(arguments.bag, false, stop);
   if (!reader_result) return fail(reader_result.error(), common::kExitUsage);
   if ((*reader_result)->info().messages == 0) tell("got no messages that can be exported");
-  const Decoders decoders((*reader_result)->info());
+  const Decoders decoders((*reader_result)->info(), *messages_result);
   const auto selection_result = select(arguments, (*reader_result)->info(), decoders);
   if (!selection_result) return fail(selection_result.error(), common::kExitFailed);
   if (arguments.as_csv) {

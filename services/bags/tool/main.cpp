@@ -88,6 +88,10 @@ int main(int argc, char** argv) {
   export_command
       ->add_option("--topic", exported.topics, "only topics of this pattern, such as '/robot/*'; may be given again")
       ->allow_extra_args(false);
+  export_command
+      ->add_option("--messages", exported.messages,
+                   "folder with .msg files of types that the bag brings no definition of; may be given again")
+      ->allow_extra_args(false);
   export_command->add_option("--from", exported.from, "seconds since the bag's start");
   export_command->add_option("--to", exported.to, "seconds since the bag's start");
   export_command->add_option("-o,--output", exported.output, "folder of --csv, file of --json, - for standard output")

@@ -51,11 +51,11 @@ Result<Wishes> parse_wishes(const ViewParameters& wanted) {
 }
 
 // Without a definition no viewer can read a topic.
-std::optional<bags::Topic> as_shown(bags::Topic topic) {
+Result<bags::Topic> as_shown(bags::Topic topic, const bags::MessageFiles& messages) {
   if (topic.definition.empty() && !topic.has_no_fields) {
-    auto known = bags::definition_of(topic.type);
-    if (!known) return {};
-    topic.definition = *std::move(known);
+    auto definition_result = messages.definition(bags::ros_type_name(topic.type));
+    if (!definition_result) return definition_result.error();
+    topic.definition = std::move(definition_result).value();
     topic.schema = "ros2msg";
   }
   return topic;
@@ -166,11 +166,15 @@ Result<std::unique_ptr<BagSource>> BagSource::open(Options options) {
   for (std::size_t i = 0; i < impl->info.topics.size(); ++i) {
     const bags::Topic& topic = impl->info.topics[i].topic;
     const bool is_wanted = impl->options.selection.wants(topic.name);
-    impl->topics.push_back(is_wanted ? as_shown(topic) : std::nullopt);
-    if (impl->topics.back()) playback.topics.push_back(static_cast<int>(i));
-    if (is_wanted && !impl->topics.back() && impl->options.on_warning) {
-      impl->options.on_warning(
-          fmt::format("{}: the definition of type {} is unknown; left out", topic.name, topic.type));
+    impl->topics.emplace_back();
+    if (!is_wanted) continue;
+    auto shown_result = as_shown(topic, impl->options.messages);
+    if (shown_result) {
+      impl->topics.back() = std::move(shown_result).value();
+      playback.topics.push_back(static_cast<int>(i));
+    } else if (impl->options.on_warning) {
+      impl->options.on_warning(fmt::format("{}: the definition of type {} is unknown; left out: {}", topic.name,
+                                           topic.type, shown_result.error().message));
     }
   }
   if (playback.topics.empty()) {

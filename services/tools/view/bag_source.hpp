@@ -10,6 +10,7 @@
 
 #include "idl/types/result.hpp"
 #include "services/bags/format/bag_reader.hpp"
+#include "services/bags/format/message_files.hpp"
 #include "services/bags/selection.hpp"
 #include "services/tools/view/view_server.hpp"
 
@@ -30,6 +31,7 @@ class BagSource {
   struct Options {
     std::filesystem::path bag;
     bags::Selection selection;
+    bags::MessageFiles messages{};  ///< definitions of types that the bag brings none of
     bool paused = false;
     std::function<void(const std::string&)> on_warning;
   };

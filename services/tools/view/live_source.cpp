@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "services/bags/format/definitions.hpp"
 #include "services/bags/listening/record_clock.hpp"
 #include "services/bags/listening/subscriptions.hpp"
 
@@ -48,7 +47,8 @@ Result<std::unique_ptr<LiveSource>> LiveSource::open(Options options, ViewServer
       {.name = "jostle_view",
        .domain = options.domain,
        .selection = std::move(options.selection),
-       .definition = [](const std::string& type) { return bags::definition_of(type); },
+       .definition = [messages =
+                          std::move(options.messages)](const std::string& type) { return messages.definition(type); },
        .on_sample = [impl = impl.get()](int topic, std::span<const std::byte> data,
                                         const wire::Origin&) { impl->on_sample(topic, data); },
        .on_warning = std::move(options.on_warning)});

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "idl/types/result.hpp"
+#include "services/bags/format/message_files.hpp"
 #include "services/bags/selection.hpp"
 #include "services/tools/view/view_server.hpp"
 
@@ -22,6 +23,7 @@ class LiveSource {
   struct Options {
     std::optional<int> domain;
     bags::Selection selection;
+    bags::MessageFiles messages{};                       ///< definitions beside the bag format's own
     std::function<void(const std::string&)> on_warning;  ///< from any thread
   };
 

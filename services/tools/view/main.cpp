@@ -19,7 +19,7 @@ using namespace jostle::tools;
 
 struct Arguments {
   std::string bag, token_file;
-  std::vector<std::string> topics, excluded;
+  std::vector<std::string> topics, excluded, messages;
   bool paused = false;
 };
 
@@ -48,10 +48,15 @@ Result<std::string> choose_token(const std::string& file, const std::string& add
 
 int view(const Arguments& arguments, ViewServerOptions options, std::optional<int> domain, std::stop_token stop) {
   const bags::Selection selection{.topics = arguments.topics, .excluded = arguments.excluded};
+  const auto messages_result = bags::message_files(arguments.messages);
+  if (!messages_result) return fail(messages_result.error());
   std::unique_ptr<BagSource> bag;
   if (!arguments.bag.empty()) {
-    auto bag_result =
-        BagSource::open({.bag = arguments.bag, .selection = selection, .paused = arguments.paused, .on_warning = say});
+    auto bag_result = BagSource::open({.bag = arguments.bag,
+                                       .selection = selection,
+                                       .messages = *messages_result,
+                                       .paused = arguments.paused,
+                                       .on_warning = say});
     if (!bag_result) return fail(bag_result.error());
     bag = std::move(bag_result).value();
     options.name = fmt::format("jostle: {}", arguments.bag);
@@ -64,7 +69,8 @@ int view(const Arguments& arguments, ViewServerOptions options, std::optional<in
   ViewServer& server = **server_result;
   std::unique_ptr<LiveSource> live;
   if (!bag) {
-    auto live_result = LiveSource::open({.domain = domain, .selection = selection, .on_warning = say}, server);
+    auto live_result = LiveSource::open(
+        {.domain = domain, .selection = selection, .messages = *messages_result, .on_warning = say}, server);
     if (!live_result) return fail(live_result.error());
     live = std::move(live_result).value();
   }
@@ -98,6 +104,10 @@ int main(int argc, char** argv) {
                  "Globs of topics, such as '/robot/*'; * goes past slashes (default: all)");
   app.add_option("--exclude", arguments.excluded,
                  "Globs of topics to leave out (default: /pool/*, unless topics are given)");
+  app.add_option("--messages", arguments.messages,
+                 "Folder with .msg files of types of your own, FOLDER/pkg/msg/Name.msg; may be given again\n"
+                 "(AMENT_PREFIX_PATH is looked through, too)")
+      ->allow_extra_args(false);
   app.add_option("--port", options.port, "Port to listen at; 0: any")->capture_default_str();
   app.add_option("--address", options.address,
                  "Address to listen at. Others than loopback have a token, which the address that is shown contains")

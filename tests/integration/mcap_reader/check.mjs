@@ -22,7 +22,8 @@ const { parse } = await load("@foxglove/rosmsg");
 const { MessageReader } = await load("@foxglove/rosmsg2-serialization");
 
 const kBegin = 1_700_000_000_000_000_000n;
-const kCount = 50_000;
+const kCount = 50_000; // on /hand
+const kOnce = 2; // one on /goal, one on /wheel
 const folder = mkdtempSync(join(tmpdir(), "jostle-mcap-"));
 after(() => rmSync(folder, { recursive: true }));
 
@@ -57,15 +58,15 @@ for (const kind of ["mcap", "raw"]) {
     assert.equal(reader.header.profile, "ros2");
     assert.match(reader.header.library, /^jostle \d+\.\d+/);
     const channels = [...reader.channelsById.values()];
-    assert.deepEqual(channels.map((channel) => channel.topic).sort(), ["/goal", "/hand", "/plan"]);
+    assert.deepEqual(channels.map((channel) => channel.topic).sort(), ["/goal", "/hand", "/plan", "/wheel"]);
     for (const channel of channels) {
       assert.equal(channel.messageEncoding, "cdr");
       assert.match(channel.metadata.get("offered_qos_profiles"), /^- history: 1\n  depth: \d+\n  reliability: [12]\n  durability: [12]\n/);
     }
     const schemas = channels.map((channel) => reader.schemasById.get(channel.schemaId));
-    assert.deepEqual(schemas.map((schema) => schema.name).sort(), ["geometry_msgs/msg/Point", "geometry_msgs/msg/Pose", "jostle_msgs/msg/Plan"]);
+    assert.deepEqual(schemas.map((schema) => schema.name).sort(), ["geometry_msgs/msg/Point", "geometry_msgs/msg/Pose", "jostle_msgs/msg/Plan", "rover_msgs/msg/Wheel"]);
     assert.ok(schemas.every((schema) => schema.encoding === "ros2msg"));
-    assert.equal(reader.statistics.messageCount, BigInt(kCount + 1));
+    assert.equal(reader.statistics.messageCount, BigInt(kCount + kOnce));
     assert.equal(reader.statistics.messageStartTime, kBegin);
     assert.equal(reader.statistics.chunkCount, reader.chunkIndexes.length);
     assert.ok(reader.chunkIndexes.length > 2);
@@ -83,12 +84,15 @@ for (const kind of ["mcap", "raw"]) {
       decoders.set(id, new MessageReader(parse(new TextDecoder().decode(schema.data), { ros2: true })));
     }
     const messages = await all(reader.readMessages());
-    assert.equal(messages.length, kCount + 1);
+    assert.equal(messages.length, kCount + kOnce);
     const goal = messages.filter((message) => reader.channelsById.get(message.channelId).topic === "/goal");
     assert.equal(goal.length, 1);
     assert.equal(goal[0].publishTime, kBegin - 7n);
     assert.deepEqual(decoders.get(goal[0].channelId).readMessage(goal[0].data),
       { position: { x: 1, y: 2, z: 3 }, orientation: { x: 0, y: 0, z: 0, w: 1 } });
+    const wheel = messages.find((message) => reader.channelsById.get(message.channelId).topic === "/wheel");
+    assert.deepEqual(decoders.get(wheel.channelId).readMessage(wheel.data),
+      { header: { stamp: { sec: 5, nanosec: 6 }, frame_id: "a" }, speed: 1.5, treads: [{ wear: 0.25, codes: new Uint8Array([7, 8]) }] });
     for (let i = 1; i < messages.length; ++i) assert.ok(messages[i - 1].logTime <= messages[i].logTime);
 
     const startTime = kBegin + 200_000_000_000n, endTime = startTime + 50_000_000n;
@@ -109,7 +113,7 @@ for (const kind of ["mcap", "raw"]) {
       for (let record; (record = reader.nextRecord());) counts[record.type] = (counts[record.type] ?? 0) + 1;
     }
     assert.ok(reader.done());
-    assert.equal(counts.Message, kCount + 1);
+    assert.equal(counts.Message, kCount + kOnce);
     assert.equal(counts.Statistics, 1);
     assert.equal(counts.Chunk, counts.ChunkIndex);
     assert.equal(counts.DataEnd, 1);

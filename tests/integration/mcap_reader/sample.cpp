@@ -3,9 +3,12 @@
 #include <cstdio>
 #include <cstring>
 #include <string>
+#include <utility>
 
 #include "services/bags/format/bag_writer.hpp"
 #include "services/bags/format/definitions.hpp"
+#include "services/bags/format/message_files.hpp"
+#include "tests/support/rover.hpp"
 
 namespace {
 
@@ -37,6 +40,15 @@ Result<void> write(const std::string& folder, const std::string& kind) {
   if (!point_result) return point_result.error();
   const auto unused_result = writer.add_topic(topic("/plan", "jostle_msgs/msg/Plan", kState));
   if (!unused_result) return unused_result.error();
+  // A type that is known by its .msg file only.
+  auto wheel_definition = bags::MessageFiles({tests::kMessageFolder}).definition(tests::kWheelType);
+  if (!wheel_definition) return wheel_definition.error();
+  const auto wheel_result = writer.add_topic(
+      {.name = "/wheel", .type = tests::kWheelType, .qos = kStream, .definition = std::move(wheel_definition).value()});
+  if (!wheel_result) return wheel_result.error();
+  const auto wheel = tests::wheel();
+  if (auto ok = writer.write(*wheel_result, {.log_time = kBegin, .publish_time = kBegin, .data = wheel}); !ok)
+    return ok;
   const auto pose = bytes_of({1, 2, 3, 0, 0, 0, 1});
   if (auto ok = writer.write(*pose_result, {.log_time = kBegin, .publish_time = kBegin - 7, .data = pose}); !ok) {
     return ok;

@@ -67,7 +67,7 @@ Result<QuasiStaticClutter> QuasiStaticClutter::make(const Scene& scene, const Cl
     model.bodies_.push_back({.outline = shape,
                              .reach = reach_of(shape),
                              .low = 0.0,
-                             .high = 2 * object.rest_height(),
+                             .high = object.top(),
                              .friction = object.friction,
                              .mass = object.mass,
                              .support = std::max(object.friction * object.mass * kGravity, 1e-6),

@@ -65,12 +65,15 @@ void set_controls(const RobotModel& robot, mjData& data, std::span<const double>
   }
 }
 
+bool hits_fixture(const mjModel& model, int geom_a, int geom_b) {
+  const double a = mark(&model, geom_a), b = mark(&model, geom_b);
+  return (a == kFixtureMark && b == kRobotMark) || (a == kRobotMark && b == kFixtureMark);
+}
+
 void note_contacts(const mjModel& model, const mjData& data, const Scene& scene, StepFacts& facts) {
   if (scene.fixtures.empty() || facts.robot_hit_fixture) return;
   for (int i = 0; i < data.ncon; ++i) {
-    const double a = mark(&model, data.contact[i].geom1), b = mark(&model, data.contact[i].geom2);
-    if ((a == kFixtureMark && b == kRobotMark) || (a == kRobotMark && b == kFixtureMark))
-      facts.robot_hit_fixture = true;
+    if (hits_fixture(model, data.contact[i].geom1, data.contact[i].geom2)) facts.robot_hit_fixture = true;
   }
 }
 

@@ -30,6 +30,9 @@ void install_engine_handlers();
 /// Sets the drives to u [nu], m/s and rad/s.
 void set_controls(const RobotModel& robot, mjData& data, std::span<const double> u);
 
+/// Whether one of two geoms is the robot's and the other a fixture.
+bool hits_fixture(const mjModel& model, int geom_a, int geom_b);
+
 /// Adds what the contacts of the step that is being prepared (after mj_step1) say.
 void note_contacts(const mjModel& model, const mjData& data, const Scene& scene, StepFacts& facts);
 

@@ -7,6 +7,9 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <numbers>
+#include <numeric>
+#include <vector>
 
 #include "idl/types/transform.hpp"
 #include "physics_pool/local/engine.hpp"
@@ -18,6 +21,8 @@ namespace {
 // conaffinity. Objects meet everything; the robot meets walls and objects; frozen
 // objects meet the robot and free objects, but neither support nor each other.
 constexpr int kSupport = 1, kMovable = 2, kRobot = 4, kWall = 8;
+
+constexpr int kContactsOfParts = 64;  // of walls and handles, which touch two bodies at a time
 
 constexpr double kFloor = -0.75;  // m, where dropped objects end
 
@@ -224,7 +229,21 @@ void write_robot(Writer& xml, const SceneRobot& robot) {
   }
 }
 
-void write_object(Writer& xml, const SceneObject& object, bool is_target, bool is_free) {
+// Shares of an object's mass, as volumes are: of its own shape, then of its parts.
+std::vector<double> masses(const SceneObject& object) {
+  const auto volume = [](const auto& body) {
+    return body.shape == Shape::kBox ? body.size[0] * body.size[1] * body.size[2]
+                                     : std::numbers::pi * body.radius * body.radius * body.height;
+  };
+  std::vector<double> shares{volume(object)};
+  for (const ObjectPart& part : object.parts) shares.push_back(volume(part));
+  const double whole = std::accumulate(shares.begin(), shares.end(), 0.0);
+  for (double& share : shares) share = object.mass * (share / whole);
+  return shares;
+}
+
+// `geoms`: at least so many; what an object lacks of them touches nothing.
+void write_object(Writer& xml, const SceneObject& object, bool is_target, bool is_free, std::size_t geoms) {
   // Muted, distinct colours for clutter; the target is the green one.
   static constexpr std::array kPalette{"0.75 0.32 0.27 1", "0.30 0.47 0.71 1", "0.85 0.62 0.27 1", "0.54 0.40 0.66 1",
                                        "0.45 0.60 0.65 1"};
@@ -234,10 +253,24 @@ void write_object(Writer& xml, const SceneObject& object, bool is_target, bool i
   if (is_free) xml.line("<freejoint/>");
   // The object's friction is the one that counts against everything softer in
   // priority; between two objects the engine takes the larger one.
-  xml.line(
-      R"(<geom {} mass="{}" friction="{} 0.005 0.0001" condim="3" priority="1" rgba="{}" contype="{}" conaffinity="{}"/>)",
-      shape_text(object), object.mass, object.friction, is_target ? "0.20 0.65 0.30 1" : kPalette[colour],
-      is_free ? kMovable : 0, (is_free ? kSupport : 0) | kMovable | kRobot);
+  const auto geom = [&](const std::string& shape, double mass) {
+    xml.line(
+        R"(<geom {} mass="{}" friction="{} 0.005 0.0001" condim="3" priority="1" rgba="{}" contype="{}" conaffinity="{}"/>)",
+        shape, mass, object.friction, is_target ? "0.20 0.65 0.30 1" : kPalette[colour], is_free ? kMovable : 0,
+        (is_free ? kSupport : 0) | kMovable | kRobot);
+  };
+  if (object.parts.empty()) {
+    geom(shape_text(object), object.mass);
+  } else {
+    const std::vector<double> shares = masses(object);
+    geom(shape_text(object), shares[0]);
+    for (std::size_t k = 0; k < object.parts.size(); ++k) {
+      geom(fmt::format("{} {}", shape_text(object.parts[k]), pose_text(object.parts[k].pose)), shares[k + 1]);
+    }
+  }
+  for (std::size_t k = object.parts.size() + 1; k < geoms; ++k) {
+    xml.line(R"(<geom type="box" size="0.001 0.001 0.001" mass="0" contype="0" conaffinity="0"/>)");
+  }
   xml.line("</body>");
 }
 
@@ -248,13 +281,20 @@ void write_drive(Writer& xml, const Joint& joint) {
 
 }  // namespace
 
+std::size_t most_geoms(const Scene& scene) {
+  std::size_t most = 1;
+  for (const SceneObject& object : scene.objects) most = std::max(most, object.parts.size() + 1);
+  return most;
+}
+
 std::string model_xml(const Scene& scene, const ModelContent& content) {
   const int objects = static_cast<int>(scene.objects.size());
   const int free = std::min(content.free, objects);
   // Four points under each object and as many with neighbours; a pyramid cone has
   // four rows per point. Pushed clutter of 6 to 31 objects was measured to have 4.3
   // contacts per object at most. Scratch memory grows with the square of the rows.
-  const int contacts = 8 * free + 32;
+  const std::size_t geoms = most_geoms(scene);
+  const int contacts = 8 * free + 32 + (geoms > 1 ? kContactsOfParts : 0);
   Writer xml;
   xml.line(R"(<mujoco model="jostle">)");
   xml.line(R"(<compiler angle="radian" boundmass="0" autolimits="false"/>)");
@@ -263,6 +303,8 @@ std::string model_xml(const Scene& scene, const ModelContent& content) {
       scene.physics.time_step, scene.physics.iterations, scene.physics.tolerance,
       scene.physics.integrator == "rk4" ? "RK4" : "Euler");
   xml.line(R"(<size nconmax="{}" njmax="{}" nuser_geom="1"/>)", contacts, 4 * contacts + 8);
+  if (scene.physics.contact_time != ScenePhysics::kSoftContact)
+    xml.line(R"(<default><geom solref="{} 1"/></default>)", scene.physics.contact_time);
   write_looks(xml, scene, content.looks);
   xml.line("<worldbody>");
   write_view(xml, scene);
@@ -270,7 +312,8 @@ std::string model_xml(const Scene& scene, const ModelContent& content) {
   for (const Fixture& fixture : scene.fixtures) write_fixture(xml, fixture);
   write_robot(xml, scene.robot);
   for (int i = 0; i < objects; ++i) {
-    write_object(xml, scene.objects[static_cast<std::size_t>(i)], i == scene.target(), i < free);
+    write_object(xml, scene.objects[static_cast<std::size_t>(i)], i == scene.target(), i < free,
+                 free < objects ? geoms : 0);
   }
   xml.line("</worldbody>");
   xml.line("<actuator>");

@@ -22,8 +22,12 @@ struct ModelContent {
   bool looks = false;  ///< whether it has what only pictures need: a megabyte of sky
 };
 
+/// Returns how many geoms the object of a scene has that has most of them.
+std::size_t most_geoms(const Scene& scene);
+
 /// Writes a scene as MJCF. Joints and actuators come in the order of layout_of(scene); bodies and geoms
-/// of the objects come last, in their order.
+/// of the objects come last, in their order: one geom for the shape that an object stands on, then one for each part.
+/// Where some objects cannot move all have most_geoms() of them, so that any can take the place of any other.
 std::string model_xml(const Scene& scene, const ModelContent& content = {});
 
 }  // namespace jostle::physics_pool

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "physics_pool/local/engine.hpp"
+#include "physics_pool/local/model_xml.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -55,27 +56,41 @@ struct ReducedSimulator::Part {
         free(free_count),
         model(mj_copyModel(nullptr, free == objects ? world.model() : world.reduced_model(free))),
         data(mj_makeData(model.get())),
+        geoms(static_cast<int>(most_geoms(world.scene()))),
         members(static_cast<std::size_t>(objects), -1) {
+    if (geoms > 1 && free < objects) {
+      // What the engine's compiler took for simple, because of the bodies that it saw here, others may not be.
+      std::fill(model->body_simple + first_body(), model->body_simple + model->nbody, mjtByte{0});
+      std::fill_n(model->dof_simplenum, model->nv, 0);
+    }
     if (time_step != world.time_step()) lengthen_step(*model, time_step);
   }
 
-  int first_geom() const { return model->ngeom - objects; }
+  int first_body() const { return model->nbody - objects; }
+  int slot_at(int geom) const { return model->geom_bodyid[geom] - first_body(); }
 
   // Puts the shape and weight of `object` into slot `slot`. Numbers come from the
   // full model, where the engine's compiler has worked them out.
   void put(int slot, int object) {
     if (members[static_cast<std::size_t>(slot)] == object) return;
     members[static_cast<std::size_t>(slot)] = object;
+    if (free == objects) return;  // everybody is in their own place
     mjModel& m = *model;
-    const int from_geom = full.ngeom - objects + object, to_geom = first_geom() + slot;
-    copy_entry(full.geom_type, from_geom, m.geom_type, to_geom);
-    copy_entry(full.geom_size, from_geom, m.geom_size, to_geom, 3);
-    copy_entry(full.geom_rbound, from_geom, m.geom_rbound, to_geom);
-    copy_entry(full.geom_friction, from_geom, m.geom_friction, to_geom, 3);
-    const int from_body = full.nbody - objects + object, to_body = m.nbody - objects + slot;
+    const int from_body = full.nbody - objects + object, to_body = first_body() + slot;
+    for (int k = 0; k < geoms; ++k) {
+      const int to = m.body_geomadr[to_body] + k;
+      if (k < full.body_geomnum[from_body]) {
+        put_geom(to, full.body_geomadr[from_body] + k, m.body_geomadr[to_body]);
+      } else {
+        m.geom_contype[to] = m.geom_conaffinity[to] = 0;
+      }
+    }
     copy_entry(full.body_mass, from_body, m.body_mass, to_body);
     copy_entry(full.body_subtreemass, from_body, m.body_subtreemass, to_body);
     copy_entry(full.body_inertia, from_body, m.body_inertia, to_body, 3);
+    copy_entry(full.body_ipos, from_body, m.body_ipos, to_body, 3);
+    copy_entry(full.body_iquat, from_body, m.body_iquat, to_body, 4);
+    copy_entry(full.body_sameframe, from_body, m.body_sameframe, to_body);
     if (slot >= free) return;
     copy_entry(full.body_invweight0, from_body, m.body_invweight0, to_body, 2);
     const int from_dof = full.body_dofadr[from_body], to_dof = m.body_dofadr[to_body];
@@ -83,6 +98,21 @@ struct ReducedSimulator::Part {
       copy_entry(full.dof_invweight0, from_dof + i, m.dof_invweight0, to_dof + i);
       copy_entry(full.dof_M0, from_dof + i, m.dof_M0, to_dof + i);
     }
+  }
+
+  // `like`: a geom that touches what this one is to touch.
+  void put_geom(int to, int from, int like) {
+    mjModel& m = *model;
+    copy_entry(full.geom_type, from, m.geom_type, to);
+    copy_entry(full.geom_size, from, m.geom_size, to, 3);
+    copy_entry(full.geom_rbound, from, m.geom_rbound, to);
+    copy_entry(full.geom_friction, from, m.geom_friction, to, 3);
+    copy_entry(full.geom_priority, from, m.geom_priority, to);
+    copy_entry(full.geom_pos, from, m.geom_pos, to, 3);
+    copy_entry(full.geom_quat, from, m.geom_quat, to, 4);
+    copy_entry(full.geom_sameframe, from, m.geom_sameframe, to);
+    copy_entry(m.geom_contype, like, m.geom_contype, to);
+    copy_entry(m.geom_conaffinity, like, m.geom_conaffinity, to);
   }
 
   // Free objects first, both groups in the scene's order.
@@ -130,6 +160,7 @@ struct ReducedSimulator::Part {
   const int objects, free;
   ModelPtr model;
   DataPtr data;
+  const int geoms;           // of a slot, where some objects cannot move
   std::vector<int> members;  // object of each slot
 };
 
@@ -186,13 +217,13 @@ void ReducedSimulator::drop_remotest(int count) {
 // Looks for frozen objects among the contacts of the step that is being prepared.
 // Two of them never meet, so whatever meets one can move.
 int ReducedSimulator::thaw_touched(const Part& part) {
-  const int first_frozen = part.first_geom() + part.free;
   int thawed = 0;
   for (int i = 0; i < part.data->ncon; ++i) {
     const mjContact& contact = part.data->contact[i];
     for (const int geom : {contact.geom1, contact.geom2}) {
-      if (geom < first_frozen) continue;
-      const auto object = static_cast<std::size_t>(part.members[static_cast<std::size_t>(geom - part.first_geom())]);
+      const int slot = part.slot_at(geom);
+      if (slot < part.free) continue;
+      const auto object = static_cast<std::size_t>(part.members[static_cast<std::size_t>(slot)]);
       thawed += free_[object] ? 0 : 1;
       free_[object] = true;
     }

@@ -55,9 +55,9 @@ Result<void> check_start(const World& world) {
                  fmt::format("scene '{}': the engine refused its start: {}", scene.name, error.what())};
   }
   const auto name = [&](int geom) -> std::string {
-    const int first_object = model.ngeom - static_cast<int>(scene.objects.size());
-    if (geom >= first_object)
-      return fmt::format("object '{}'", scene.objects[static_cast<std::size_t>(geom - first_object)].name);
+    const int first_object = model.nbody - static_cast<int>(scene.objects.size());
+    if (const int object = model.geom_bodyid[geom] - first_object; object >= 0)
+      return fmt::format("object '{}'", scene.objects[static_cast<std::size_t>(object)].name);
     const char* known = mj_id2name(&model, mjOBJ_GEOM, geom);
     const char* body = mj_id2name(&model, mjOBJ_BODY, model.geom_bodyid[geom]);
     if (known) {

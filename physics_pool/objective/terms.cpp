@@ -71,7 +71,8 @@ double pads_cost(const TaskGeometry& geometry, const State& x, double angle_weig
   const InTool p = in_tool(geometry, x, geometry.view(x).target().position());
   const double ahead = p.forward - geometry.robot.hand->depth;
   const double angle = target_bearing(geometry, x).angle;
-  return ahead * ahead + p.left * p.left + angle_weight * (angle * angle);
+  const double beside = ahead * ahead + p.left * p.left;
+  return (geometry.planar ? beside : beside + p.up * p.up) + angle_weight * (angle * angle);
 }
 
 double obstacle_cost(const TaskGeometry& geometry, const State& x, const ObstacleCost& obstacle) {

@@ -27,10 +27,6 @@ struct Footprint {
   Outline outline;
 };
 
-Footprint footprint(const SceneObject& object) {
-  return {.x = object.x, .y = object.y, .yaw = object.yaw, .outline = outline(object)};
-}
-
 Footprint footprint(const Disc& disc) { return {.x = disc.x, .y = disc.y, .outline = {.radius = disc.radius}}; }
 
 // What of a geom that stands upright one sees from above; nothing of others.
@@ -49,20 +45,42 @@ std::optional<Footprint> footprint(const Eigen::Isometry3d& X_WG, const RobotGeo
   return seen;
 }
 
-// What of a fixture is no higher than `height` above the surface, from above; of one that leans, what is around it.
+// Half the extents, along the axes of the frame that X leads to, of the box around a body. Of a body that is an
+// object's part or a fixture.
+template <class Body>
+Eigen::Vector3d half_extents(const Eigen::Isometry3d& X, const Body& body) {
+  const Eigen::Vector3d half = body.shape == Shape::kBox ? Eigen::Vector3d(body.size[0], body.size[1], body.size[2]) / 2
+                                                         : Eigen::Vector3d(body.radius, body.radius, body.height / 2);
+  return X.linear().cwiseAbs() * half;
+}
+
+// What one sees of a body from above; of one that leans, what is around it.
+template <class Body>
+Footprint seen_from_above(const Eigen::Isometry3d& X, const Body& body) {
+  const RobotGeom geom{.shape = body.shape == Shape::kBox ? GeomShape::kBox : GeomShape::kCylinder,
+                       .size = body.size,
+                       .radius = body.radius};
+  if (const auto seen = footprint(X, geom)) return *seen;
+  const Eigen::Vector3d reach = half_extents(X, body), centre = X.translation();
+  return {.x = centre.x(), .y = centre.y(), .outline = {.half_x = reach.x(), .half_y = reach.y()}};
+}
+
+// What of a fixture is no higher than `height` above the surface, from above.
 std::optional<Footprint> footprint(const Fixture& fixture, double height) {
   const Eigen::Isometry3d X = transform(fixture.pose);
-  const Eigen::Vector3d half = fixture.shape == Shape::kBox
-                                   ? Eigen::Vector3d(fixture.size[0], fixture.size[1], fixture.size[2]) / 2
-                                   : Eigen::Vector3d(fixture.radius, fixture.radius, fixture.height / 2);
-  const Eigen::Vector3d reach = X.linear().cwiseAbs() * half;
-  const Eigen::Vector3d centre = X.translation();
-  if (centre.z() - reach.z() >= height || centre.z() + reach.z() <= 0) return {};
-  const RobotGeom body{.shape = fixture.shape == Shape::kBox ? GeomShape::kBox : GeomShape::kCylinder,
-                       .size = fixture.size,
-                       .radius = fixture.radius};
-  if (const auto seen = footprint(X, body)) return seen;
-  return Footprint{.x = centre.x(), .y = centre.y(), .outline = {.half_x = reach.x(), .half_y = reach.y()}};
+  const double reach = half_extents(X, fixture).z(), centre = X.translation().z();
+  if (centre - reach >= height || centre + reach <= 0) return {};
+  return seen_from_above(X, fixture);
+}
+
+// Those of the shape that it stands on, and of its parts.
+std::vector<Footprint> footprints(const SceneObject& object) {
+  std::vector<Footprint> seen{{.x = object.x, .y = object.y, .yaw = object.yaw, .outline = outline(object)}};
+  if (object.parts.empty()) return seen;
+  const Eigen::Isometry3d X_WB =
+      transform({.position = {object.x, object.y, object.rest_height()}, .orientation = turned_about_z(object.yaw)});
+  for (const ObjectPart& part : object.parts) seen.push_back(seen_from_above(X_WB * transform(part.pose), part));
+  return seen;
 }
 
 // The footprint of a robot that moves in the plane; empty for others.
@@ -104,6 +122,14 @@ double footprint_gap(const Footprint& a, const Footprint& b) {
   if (a.outline.radius > 0) return disc_gap(a, b);
   if (b.outline.radius > 0) return disc_gap(b, a);
   return rectangle_gap(a, b);
+}
+
+double footprint_gap(const std::vector<Footprint>& a, const std::vector<Footprint>& b) {
+  double gap = std::numeric_limits<double>::infinity();
+  for (const Footprint& one : a) {
+    for (const Footprint& other : b) gap = std::min(gap, footprint_gap(one, other));
+  }
+  return gap;
 }
 
 // A field of a scene, as a file spells it and as people like to read it.
@@ -256,7 +282,9 @@ class Inspection {
     }
     check({"physics.", "physics."}, {{"time_step", physics.time_step, 1e-4, 0.02, "s"},
                                      {"iterations", double(physics.iterations), 1, 1000, ""},
-                                     {"tolerance", physics.tolerance, 0, 1, ""}});
+                                     {"tolerance", physics.tolerance, 0, 1, ""},
+                                     {"contact_time", physics.contact_time,
+                                      std::min(2 * physics.time_step, ScenePhysics::kSoftContact), 1, "s"}});
   }
 
   void look_at_object(std::size_t i, bool is_robot_sound) {
@@ -265,6 +293,7 @@ class Inspection {
     const Field pose{parent.path + "pose", parent.shown + "pose"};
     check_name(object.name, parent);
     check_sizes(object, parent, kLargest);
+    for (std::size_t k = 0; k < object.parts.size(); ++k) look_at_part(object, k, parent);
     check(parent, {{"mass", object.mass, 1e-4, 100, "kg"},
                    {"friction", object.friction, 0, 5, ""},
                    {"pose.yaw", object.yaw, -7, 7, "rad"}});
@@ -279,10 +308,24 @@ class Inspection {
       const SceneObject& other = scene_.objects[j];
       if (!overlap(object, other)) continue;
       add_relative(pose, fmt::format("inside object '{}' by {:.1f} mm, wanted a free place", other.name,
-                                     -1e3 * footprint_gap(footprint(object), footprint(other))));
+                                     -1e3 * footprint_gap(footprints(object), footprints(other))));
     }
     if (is_robot_sound && overlaps_robot(scene_, object)) {
       add_relative(pose, "inside the robot at its start, wanted a free place; move robot.start or the object");
+    }
+  }
+
+  void look_at_part(const SceneObject& object, std::size_t k, const Field& parent) {
+    const ObjectPart& part = object.parts[k];
+    const std::string name = fmt::format("parts[{}].", k);
+    const Field field{parent.path + name, parent.shown + name};
+    check_sizes(part, field, kLargest);
+    check_pose(part.pose, {field.path + "pose.", field.shown + "pose."});
+    const Eigen::Isometry3d X_BP = transform(part.pose);
+    const double lowest = X_BP.translation().z() - half_extents(X_BP, part).z() + object.rest_height();
+    if (lowest < 0) {
+      add({field.path + "pose", field.shown + "pose"},
+          fmt::format("reaches {:.1f} mm below what the object stands on, wanted a part above it", -1e3 * lowest));
     }
   }
 
@@ -360,29 +403,67 @@ std::vector<Fixture> shelf_walls(const Rectangle& surface, double height) {
 
 double SceneObject::rest_height() const { return (shape == Shape::kBox ? size[2] : height) / 2; }
 
+double SceneObject::top() const {
+  double highest = rest_height();
+  for (const ObjectPart& part : parts) {
+    const Eigen::Isometry3d X_BP = transform(part.pose);
+    highest = std::max(highest, X_BP.translation().z() + half_extents(X_BP, part).z());
+  }
+  return rest_height() + highest;
+}
+
+double SceneObject::reach() const {
+  double farthest = shape == Shape::kBox ? std::hypot(size[0], size[1]) / 2 : radius;
+  for (const ObjectPart& part : parts) {
+    const Eigen::Isometry3d X_BP = transform(part.pose);
+    const Footprint seen = seen_from_above(X_BP, part);
+    const double c = std::cos(seen.yaw), s = std::sin(seen.yaw);
+    const double along = std::abs(c * seen.x + s * seen.y), across = std::abs(c * seen.y - s * seen.x);
+    const double beyond = seen.outline.radius > 0
+                              ? std::hypot(along, across) + seen.outline.radius
+                              : std::hypot(along + seen.outline.half_x, across + seen.outline.half_y);
+    farthest = std::max(farthest, beyond);
+  }
+  return farthest;
+}
+
+void SceneObject::scale(double factor) {
+  const auto scale_body = [factor](auto& body) {
+    for (double& extent : body.size) extent *= factor;
+    body.radius *= factor;
+    body.height *= factor;
+  };
+  scale_body(*this);
+  for (ObjectPart& part : parts) {
+    scale_body(part);
+    for (double& coordinate : part.pose.position) coordinate *= factor;
+  }
+}
+
 int Scene::target() const {
   const auto found = std::ranges::find(objects, task.target, &SceneObject::name);
   return found == objects.end() ? -1 : static_cast<int>(found - objects.begin());
 }
 
 double signed_distance(const SceneObject& object, const Disc& disc) {
-  return disc_gap(footprint(disc), footprint(object));
+  const Footprint area = footprint(disc);
+  const Footprint own{.x = object.x, .y = object.y, .yaw = object.yaw, .outline = outline(object)};
+  if (object.parts.empty()) return disc_gap(area, own);
+  return footprint_gap({area}, footprints(object));
 }
 
 bool overlap(const SceneObject& a, const SceneObject& b, double gap) {
-  return footprint_gap(footprint(a), footprint(b)) < gap;
+  return footprint_gap(footprints(a), footprints(b)) < gap;
 }
 
 bool overlaps_robot(const Scene& scene, const SceneObject& object, double gap) {
-  const Footprint body = footprint(object);
-  return std::ranges::any_of(footprint(scene.robot),
-                             [&](const Footprint& part) { return footprint_gap(part, body) < gap; });
+  return footprint_gap(footprint(scene.robot), footprints(object)) < gap;
 }
 
 bool is_free(const Scene& scene, const SceneObject& object, double gap) {
   const auto meets = [&](const Fixture& fixture) {
-    const auto part = footprint(fixture, 2 * object.rest_height());
-    return part && footprint_gap(*part, footprint(object)) < gap;
+    const auto part = footprint(fixture, object.top());
+    return part && footprint_gap({*part}, footprints(object)) < gap;
   };
   return !overlaps_robot(scene, object, gap) && std::ranges::none_of(scene.fixtures, meets) &&
          std::ranges::none_of(scene.objects, [&](const SceneObject& other) { return overlap(object, other, gap); });

@@ -149,6 +149,12 @@ Scene read(Fields& fields, const RobotPath& robots) {
     SceneObject object;
     entry.required("name", object.name);
     read_shape(entry, object);
+    entry.optional_list("parts", [&](Fields& piece) {
+      ObjectPart part;
+      read_shape(piece, part);
+      piece.section("pose", true, [&](Fields& pose) { read_pose(pose, part.pose); });
+      object.parts.push_back(part);
+    });
     entry.required("mass", object.mass);
     entry.required("friction", object.friction);
     entry.section("pose", true, [&](Fields& pose) {
@@ -170,6 +176,7 @@ Scene read(Fields& fields, const RobotPath& robots) {
     physics.optional("integrator", scene.physics.integrator);
     physics.optional("iterations", scene.physics.iterations);
     physics.optional("tolerance", scene.physics.tolerance);
+    physics.optional("contact_time", scene.physics.contact_time);
   });
   return scene;
 }
@@ -254,6 +261,15 @@ std::string to_yaml(const Scene& scene, RobotText robot_text_as) {
     line("    mass: {}", object.mass);
     line("    friction: {}", object.friction);
     line("    pose: {{x: {}, y: {}, yaw: {}}}", object.x, object.y, object.yaw);
+    if (!object.parts.empty()) line("    parts:");
+    for (const ObjectPart& part : object.parts) {
+      if (part.shape == Shape::kBox) {
+        line("      - {{shape: box, size: [{}], pose: {}}}", fmt::join(part.size, ", "), pose_text(part.pose));
+      } else {
+        line("      - {{shape: cylinder, radius: {}, height: {}, pose: {}}}", part.radius, part.height,
+             pose_text(part.pose));
+      }
+    }
   }
   line("task:");
   line("  kind: {}", scene.task.kind);
@@ -263,8 +279,12 @@ std::string to_yaml(const Scene& scene, RobotText robot_text_as) {
   };
   if (const TaskKind* kind = find_task_kind(scene.task.kind); kind && kind->has_goal) disc("goal", scene.task.goal);
   if (scene.task.obstacle) disc("obstacle", *scene.task.obstacle);
-  line("physics: {{time_step: {}, integrator: {}, iterations: {}, tolerance: {}}}", scene.physics.time_step,
-       scene.physics.integrator, scene.physics.iterations, scene.physics.tolerance);
+  const ScenePhysics& physics = scene.physics;
+  // Scenes that do not say how hard contacts are have the hashes that they had before it could be said.
+  line("physics: {{time_step: {}, integrator: {}, iterations: {}, tolerance: {}{}}}", physics.time_step,
+       physics.integrator, physics.iterations, physics.tolerance,
+       physics.contact_time == ScenePhysics::kSoftContact ? ""
+                                                          : fmt::format(", contact_time: {}", physics.contact_time));
   return text;
 }
 

@@ -23,7 +23,9 @@ double cost(const TaskGeometry& geometry, const State& x, double angle_weight) {
 double distance(const TaskGeometry& geometry, const State& x) { return target_bearing(geometry, x).distance; }
 
 double distance_at_end(const TaskGeometry& geometry) {
-  return std::hypot(geometry.robot.hand->far, geometry.robot.hand->side);
+  const Hand& hand = *geometry.robot.hand;
+  if (geometry.planar) return std::hypot(hand.far, hand.side);
+  return std::hypot(hand.far, hand.side, geometry.tops[static_cast<std::size_t>(geometry.layout.target)]);
 }
 
 std::string failure(const TaskGeometry&, const State&) { return ""; }

@@ -54,10 +54,12 @@ TaskGeometry::TaskGeometry(const Scene& scene)
       planar(as_planar(scene.robot.model)),
       disc_radius(physics_pool::disc_radius(scene.robot.model).value_or(0.0)) {
   target.name.clear();  // a copy must not allocate
+  target.parts.clear();
   for (const SceneObject& object : scene.objects) {
     rest_heights.push_back(object.rest_height());
-    footprints.push_back(object.shape == Shape::kBox ? std::hypot(object.size[0], object.size[1]) / 2 : object.radius);
-    round.push_back(object.shape == Shape::kCylinder);
+    tops.push_back(object.top());
+    footprints.push_back(object.reach());
+    round.push_back(object.shape == Shape::kCylinder && object.parts.empty());
   }
 }
 
@@ -79,9 +81,16 @@ double squared_distance(const Disc& disc, const double* position) {
   return dx * dx + dy * dy;
 }
 
+bool is_level_with(const TaskGeometry& geometry, std::size_t object, double up) {
+  if (geometry.planar) return true;
+  const double height = geometry.rest_heights[object] - up;
+  return height >= 0 && height <= geometry.tops[object];
+}
+
 TargetBearing target_bearing(const TaskGeometry& geometry, const State& x) {
   const InTool p = in_tool(geometry, x, geometry.view(x).target().position());
-  return {.distance = std::hypot(p.forward, p.left), .angle = std::abs(std::atan2(p.left, p.forward))};
+  return {.distance = geometry.planar ? std::hypot(p.forward, p.left) : std::hypot(p.forward, p.left, p.up),
+          .angle = std::abs(std::atan2(p.left, p.forward))};
 }
 
 bool in_pre_grasp_region(const TaskGeometry& geometry, const State& x) {
@@ -91,7 +100,8 @@ bool in_pre_grasp_region(const TaskGeometry& geometry, const State& x) {
   const InTool p = in_tool(geometry, x, view.target().position());
   return p.forward >= hand.near && p.forward <= hand.far &&
          p.left <= std::min(hand.side, q[static_cast<std::size_t>(hand.left)]) &&
-         p.left >= -std::min(hand.side, q[static_cast<std::size_t>(hand.right)]);
+         p.left >= -std::min(hand.side, q[static_cast<std::size_t>(hand.right)]) &&
+         is_level_with(geometry, static_cast<std::size_t>(geometry.layout.target), p.up);
 }
 
 int count_obstructions(const TaskGeometry& geometry, const State& x) {
@@ -103,7 +113,8 @@ int count_obstructions(const TaskGeometry& geometry, const State& x) {
   return count_of(view, [&](std::size_t i) {
     if (view.is_target(i)) return false;
     const InTool p = in_tool(geometry, x, view.object(i).position());
-    return p.forward >= 0 && p.forward <= hand.finger_length && p.left <= left && p.left >= -right;
+    return p.forward >= 0 && p.forward <= hand.finger_length && p.left <= left && p.left >= -right &&
+           is_level_with(geometry, i, p.up);
   });
 }
 

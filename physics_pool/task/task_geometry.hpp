@@ -18,11 +18,12 @@ struct TaskGeometry {
   StateLayout layout;
   Surface surface;
   std::vector<double> rest_heights;  ///< [objects] m
+  std::vector<double> tops;          ///< [objects] m, how high each reaches above what it stands on
   std::vector<double> footprints;    ///< [objects] m, radius of the smallest disc around each, seen from above
   std::vector<bool> round;           ///< [objects] whether a turn about its own axis leaves it as it was
   SceneTask task;
   const TaskKind* kind;  ///< what task.kind means
-  SceneObject target;    ///< the target's shape, without its name; the state says where it is
+  SceneObject target;    ///< the shape the target stands on, without its name; the state says where it is
   RobotModel robot;      ///< without its geoms, which cost copies and which nobody here asks for
   Eigen::Isometry3d base;
   std::vector<double> reaches;        ///< [nu] axis_reaches() of the robot
@@ -43,17 +44,23 @@ InTool in_tool(const TaskGeometry& geometry, const State& x, const double* posit
 
 double squared_distance(const Disc& disc, const double* position);  ///< in the plane, m^2
 
-/// Distance and bearing of the target from the hand, Fig. 3.2.
+/// Whether a hand that is `up` below an object's centre (in_tool) is between the object's foot and its top. Always so
+/// for robots that move in the plane: their hands are as high as what they grasp.
+bool is_level_with(const TaskGeometry& geometry, std::size_t object, double up);
+
+/// Distance and bearing of the target from the hand, Fig. 3.2. The distance is in the hand's plane, if the robot moves
+/// in the plane; in space, if it does not.
 struct TargetBearing {
   double distance = 0.0;  ///< d_T, m
   double angle = 0.0;     ///< phi_T, rad, in [0, pi]
 };
 TargetBearing target_bearing(const TaskGeometry& geometry, const State& x);
 
-/// Whether the target's centre is in the pre-grasp region of the hand, which there must be.
+/// Whether the target's centre is in the pre-grasp region of the hand, which there must be, and the hand level with it.
 bool in_pre_grasp_region(const TaskGeometry& geometry, const State& x);
 
-/// Counts other objects whose centre lies between the fingers, palm to fingertips; 0 without a hand.
+/// Counts other objects whose centre lies between the fingers, palm to fingertips, the hand being level with them; 0
+/// without a hand.
 int count_obstructions(const TaskGeometry& geometry, const State& x);
 
 /// Returns indices of the other objects whose centre is in the goal region; none where the task has no region.

@@ -38,9 +38,14 @@ std::optional<Scene> draw_belief(const Scene& execution, double scale, CounterSt
       };
       const Rectangle bounds = execution.surface.bounds();
       object = truth;
-      for (double& extent : object.size) extent = noisy(extent, kSizeSigma, extent / 2);
-      object.radius = noisy(object.radius, kSizeSigma, object.radius / 2);
-      object.height = noisy(object.height, kSizeSigma, object.height / 2);
+      if (object.parts.empty()) {
+        for (double& extent : object.size) extent = noisy(extent, kSizeSigma, extent / 2);
+        object.radius = noisy(object.radius, kSizeSigma, object.radius / 2);
+        object.height = noisy(object.height, kSizeSigma, object.height / 2);
+      } else {
+        const double reach = object.reach();
+        object.scale(noisy(reach, kSizeSigma, reach / 2) / reach);
+      }
       object.mass = noisy(object.mass, kMassSigma, object.mass / 2);
       object.friction = noisy(object.friction, kFrictionSigma, object.friction / 2);
       object.x = std::clamp(noisy(object.x, kPositionSigma, bounds.low_x()), bounds.low_x(), bounds.high_x());

@@ -59,6 +59,11 @@ Scene realize(const Scene& nominal, const ParameterBounds& bounds, std::uint64_t
       object.mass = between(bounds.least_mass, bounds.most_mass, seed, draw(0));
       object.friction = between(bounds.least_friction, bounds.most_friction, seed, draw(1));
       std::uint32_t axis = 2;
+      if (!object.parts.empty()) {
+        const double reach = object.reach();
+        object.scale(std::max(1 + share * bounds.size * either_way(seed, draw(axis)) / reach, 0.5));
+        return object;
+      }
       for (double* extent : {&object.size[0], &object.size[1], &object.size[2], &object.radius, &object.height}) {
         *extent = std::max(*extent + share * bounds.size * either_way(seed, draw(axis++)), *extent / 2);
       }

@@ -196,6 +196,23 @@ TEST_F(Record, GlobsChooseTopics) {
   EXPECT_EQ(secret.is_heard(0) + other.is_heard(0), 2);
 }
 
+TEST_F(Record, LeavesOutHiddenTopicsUnlessAGlobNamesThem) {
+  record({});
+  Publisher hidden(domain, "/a/_action/status", kDeepRetained), open(domain, "/a/b", kDeep);
+  ASSERT_TRUE(open.is_heard());
+  open.write(1);
+  ASSERT_TRUE(open.was_received());
+  ASSERT_EQ(stop_recorder(), 0) << recorder->err();
+  EXPECT_THAT(topics_of(bag()), ElementsAre("/a/b"));
+
+  record({"/a/*", "-o", folder.path() / "all"});
+  ASSERT_TRUE(hidden.is_heard());
+  hidden.write(1);
+  ASSERT_TRUE(hidden.was_received());
+  ASSERT_EQ(stop_recorder(), 0) << recorder->err();
+  EXPECT_THAT(topics_of(folder.path() / "all"), ElementsAre("/a/_action/status"));
+}
+
 TEST_F(Record, NamesTypesItDoesNotKnowAndLeavesThemOut) {
   record({"/x", "/y"});
   Publisher unknown(domain, "/x", kDeep, "robots_of_others_msgs/msg/Wheel"), known(domain, "/y", kDeep);

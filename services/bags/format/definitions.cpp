@@ -43,7 +43,7 @@ std::string line_of(const Field& field) {
                      field.comment);
 }
 
-using Structs = std::map<std::string, Struct>;  // by "pkg/Name"
+using Structs = std::map<std::string, Struct>;  // by "pkg/Name", or "pkg/srv/Name", "pkg/action/Name"
 
 std::vector<Token> tokens_of(std::string_view text) {
   std::vector<Token> tokens;
@@ -165,8 +165,18 @@ class IdlParser {
     expect("module");
     package_ = take_name();
     expect("{");
+    do {
+      parse_kind();
+    } while (!error_ && !take_if("}"));
+    expect(";");
+  }
+
+  // Parses the messages of a package, or the parts of its services, or of its actions.
+  void parse_kind() {
     expect("module");
-    if (const Token token = take(); token.text != "msg") fail(token, "module msg");
+    const Token kind = take();
+    if (kind.text != "msg" && kind.text != "srv" && kind.text != "action") fail(kind, "module msg, srv or action");
+    prefix_ = prefix_of(package_, kind.text);
     expect("{");
     while (!error_ && !take_if("}")) {
       if (peek().text == "module") {
@@ -176,8 +186,10 @@ class IdlParser {
       }
     }
     expect(";");
-    expect("}");
-    expect(";");
+  }
+
+  static std::string prefix_of(const std::string& package, const std::string& kind) {
+    return package + (kind == "msg" ? "/" : "/" + kind + "/");
   }
 
   // Parses the constants of the struct that follows, in a module of their own: IDL has no constants in a struct.
@@ -215,7 +227,7 @@ class IdlParser {
     while (!error_ && !take_if("}")) message.fields.push_back(parse_field());
     expect(";");
     pending_.clear();
-    structs_[package_ + "/" + name] = std::move(message);
+    structs_[prefix_ + name] = std::move(message);
   }
 
   Field parse_field() {
@@ -263,14 +275,16 @@ class IdlParser {
       }
       return;
     }
-    // pkg::msg::Name, or a name of this package.
+    // pkg::msg::Name, or a name of this module.
     field.is_ours = true;
-    const std::size_t end_of_package = name.find("::msg::");
-    if (end_of_package != std::string::npos) {
-      field.type = name.substr(0, end_of_package) + "/" + name.substr(end_of_package + 7);
-    } else if (name.find(':') == std::string::npos && !name.empty() &&
+    const std::size_t end_of_package = name.find("::");
+    const std::size_t end_of_kind = name.find("::", end_of_package + 2);
+    if (end_of_package != std::string::npos && end_of_kind != std::string::npos) {
+      const std::string kind = name.substr(end_of_package + 2, end_of_kind - end_of_package - 2);
+      field.type = prefix_of(name.substr(0, end_of_package), kind) + name.substr(end_of_kind + 2);
+    } else if (end_of_package == std::string::npos && !name.empty() &&
                std::isalpha(static_cast<unsigned char>(name[0])) != 0) {
-      field.type = package_ + "/" + name;
+      field.type = prefix_ + name;
     } else {
       fail(first, "a type");
     }
@@ -281,6 +295,7 @@ class IdlParser {
   std::size_t at_ = 0;
   Structs& structs_;
   std::string package_;
+  std::string prefix_;                  // of names in Structs
   std::string constants_of_;            // a struct that must follow
   std::vector<std::string> constants_;  // its lines
   std::vector<std::string> pending_;    // comments on lines of their own
@@ -338,7 +353,8 @@ Result<std::map<std::string, std::string>> definitions_of_idl(
     std::string text = text_of(message);
     for (const std::string& part : parts) text += fmt::format("{}\nMSG: {}\n{}", line, part, text_of(structs.at(part)));
     const std::size_t slash = name.find('/');
-    definitions[name.substr(0, slash) + "/msg" + name.substr(slash)] = std::move(text);
+    const bool is_message = name.find('/', slash + 1) == std::string::npos;
+    definitions[is_message ? name.substr(0, slash) + "/msg" + name.substr(slash) : name] = std::move(text);
   }
   return definitions;
 }

@@ -16,7 +16,8 @@ namespace jostle::bags {
 
 /// Returns the definition of a type ("geometry_msgs/msg/Pose") as ROS 2 tools want it: its .msg file and, behind
 /// lines of `=`, those of the types that it is made of. Every message of idl/msg has one, with the
-/// comments it has there; nothing for other types.
+/// comments it has there, and so have the parts of its services and actions ("jostle_msgs/action/Manipulate_Goal");
+/// nothing for other types.
 std::optional<std::string> definition_of(const std::string& type);
 
 /// Returns the definition without the field that was appended since bags were first recorded, for old bags of our
@@ -33,7 +34,7 @@ std::string ros_topic_name(const std::string& topic);
 /// Returns all types that have a definition, sorted.
 std::vector<std::string> known_types();
 
-/// Makes definitions, by type, from IDL: modules of modules of structs, as idl/msg has them. A module
+/// Makes definitions, by type, from IDL: modules of modules (msg, srv, action) of structs, as idl/msg has them. A module
 /// `Name_Constants` of `const TYPE NAME = VALUE;` holds the constants of the struct `Name`, as ROS 2
 /// writes them.
 /// Error kInvalidArgument with file name and line.

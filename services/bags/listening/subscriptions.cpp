@@ -122,6 +122,8 @@ struct Subscriptions::Impl {
   void consider(const wire::Endpoint& endpoint) {
     const auto name = wire::ros_topic(endpoint.topic);
     if (!name || !wire::ros_type(endpoint.type)) return;
+    // Hidden topics are for who names them, as with ROS 2's tools.
+    if (options.selection.topics.empty() && name->find("/_") != std::string::npos) return;
     if (!options.selection.wants(*name)) {
       const std::lock_guard lock(mutex);
       if (passed_over.size() < kShown) passed_over.insert(*name);
@@ -234,7 +236,7 @@ Result<std::unique_ptr<Subscriptions>> Subscriptions::open(Options options) {
       [impl = impl.get()](const wire::Endpoint& endpoint) { impl->note(endpoint); },
       [impl = impl.get()](const wire::Endpoint& endpoint) { impl->forget(endpoint); });
   auto participant_result = wire::Participant::open(
-      {.name = impl->options.name, .domain = impl->options.domain, .watch = watch, .role = wire::Role::kObserver});
+      {.name = impl->options.name, .domain = impl->options.domain, .watch = watch, .role = impl->options.role});
   if (!participant_result) return participant_result.error();
   impl->participant = *participant_result;
   try {

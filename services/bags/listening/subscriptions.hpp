@@ -26,12 +26,13 @@ namespace jostle::bags {
 /// A writer that offers less than the readers so far ask for gets a reader of its own. A sample
 /// that comes to two readers counts once. Says why a topic is left out: a type whose definition
 /// is unknown, a key that cannot be found, two types on one topic. Topics and types that are not
-/// ROS 2's are passed over.
+/// ROS 2's are passed over, and its hidden topics (/grasp/_action/status) unless globs select topics.
 class Subscriptions {
  public:
   struct Options {
     std::string name = "jostle_record";  ///< of the participant, as tools list it
     std::optional<int> domain;
+    wire::Role role = wire::Role::kObserver;  ///< that an identity must have
     Selection selection;
     /// Returns the text of a type such as "jostle_msgs/msg/Goal". An error says why there is none.
     std::function<Result<std::string>(const std::string& type)> definition;

@@ -25,22 +25,45 @@ struct Package {
   std::set<std::string> depends;                           // other packages
 };
 
-// A definition is the type's own file, and behind lines of `=` those of others.
+// Returns a type's own file, and notes the packages of the types behind it: a definition has them behind lines of `=`.
+std::string own_definition(const std::string& type, Package& package) {
+  std::string definition = bags::definition_of(type).value();
+  std::istringstream lines(definition);
+  for (std::string line; std::getline(lines, line);) {
+    constexpr std::string_view kPart = "MSG: ";
+    if (!line.starts_with(kPart)) continue;
+    const std::string other = line.substr(kPart.size(), line.find('/') - kPart.size());
+    if (other != package.name) package.depends.insert(other);
+  }
+  definition.resize(std::min(definition.find(std::string(80, '=')), definition.size()));
+  return definition;
+}
+
+// Files that have several definitions, one after the other, by the ends of their types' names. What else there is of a
+// service or an action follows from them.
+struct Kind {
+  std::string_view name;
+  std::vector<std::string> parts;
+};
+const Kind kKinds[] = {
+    {"msg", {""}}, {"srv", {"_Request", "_Response"}}, {"action", {"_Goal", "_Result", "_Feedback"}}};
+
 Package read_types(const std::string& name) {
   Package package{.name = name, .files = {}, .depends = {}};
-  const std::string prefix = name + "/msg/";
-  for (const std::string& type : bags::known_types()) {
-    if (!type.starts_with(prefix)) continue;
-    std::string definition = bags::definition_of(type).value();
-    std::istringstream lines(definition);
-    for (std::string line; std::getline(lines, line);) {
-      constexpr std::string_view kPart = "MSG: ";
-      if (!line.starts_with(kPart)) continue;
-      const std::string other = line.substr(kPart.size(), line.find('/') - kPart.size());
-      if (other != name) package.depends.insert(other);
+  for (const Kind& kind : kKinds) {
+    const std::string prefix = fmt::format("{}/{}/", name, kind.name);
+    for (const std::string& type : bags::known_types()) {
+      if (!type.starts_with(prefix) || !type.ends_with(kind.parts.front())) continue;
+      const std::string stem = type.substr(0, type.size() - kind.parts.front().size());
+      // A request of an action's service is none of its own.
+      const auto is_there = [&](const std::string& part) { return bags::definition_of(stem + part).has_value(); };
+      if (!std::ranges::all_of(kind.parts, is_there)) continue;
+      std::string text;
+      for (const std::string& part : kind.parts)
+        text += (text.empty() ? "" : "---\n") + own_definition(stem + part, package);
+      package.files.emplace_back(fmt::format("{0}/{1}.{0}", kind.name, stem.substr(prefix.size())), std::move(text));
+      if (kind.name == "action") package.depends.insert("action_msgs");
     }
-    definition.resize(std::min(definition.find(std::string(80, '=')), definition.size()));
-    package.files.emplace_back(fmt::format("msg/{}.msg", type.substr(prefix.size())), std::move(definition));
   }
   return package;
 }
@@ -95,10 +118,10 @@ Result<void> write(const fs::path& folder, const std::string& version, const std
   const std::string build = build_file(package);
   package.files.emplace_back("CMakeLists.txt", build);
   package.files.emplace_back("package.xml", manifest(package, version));
-  std::error_code problem;
-  fs::create_directories(folder / "msg", problem);
-  if (problem) return Error{Code::kIo, fmt::format("{}: {}", folder.string(), problem.message())};
   for (const auto& [file, text] : package.files) {
+    std::error_code problem;
+    fs::create_directories((folder / file).parent_path(), problem);
+    if (problem) return Error{Code::kIo, fmt::format("{}: {}", folder.string(), problem.message())};
     if (auto ok = files::write(folder / file, text); !ok) return ok;
   }
   return {};

@@ -11,6 +11,7 @@
 
 #include "services/common/process/program.hpp"
 #include "services/common/process/trouble.hpp"
+#include "services/task/coordinator/goal_texts.hpp"
 #include "services/task/coordinator/markers.hpp"
 #include "services/task/session/phases.hpp"
 #include "services/wire/limits.hpp"
@@ -94,19 +95,6 @@ std::map<std::string, std::uint64_t> apportion(const Shares& shares, std::uint64
   return result;
 }
 
-// Bytes that are parsed have a limit: parsers take hundreds of times as many.
-Result<void> check_sizes(const jostle_msgs::msg::Goal& goal) {
-  const std::pair<const char*, const std::string&> texts[] = {{"goal.execution_scene", goal.execution_scene()},
-                                                              {"goal.planning_scene", goal.planning_scene()},
-                                                              {"goal.parameters", goal.parameters()}};
-  for (const auto& [field, text] : texts) {
-    if (text.size() <= limits::kText) continue;
-    return Error{Code::kInvalidArgument,
-                 fmt::format("{}: got {} bytes, wanted at most {}", field, text.size(), limits::kText)};
-  }
-  return {};
-}
-
 std::string shown(const std::string& text) { return common::shown(text, limits::kShown); }
 
 // For what a bag of the run cannot do without. The task itself goes on: a robot does not stop because
@@ -176,12 +164,28 @@ Coordinator::Coordinator(const wire::Participant& participant, physics_pool::Asy
       plan_writer_(participant, wire::topics::kTaskPlan),
       scene_marker_writer_(participant, wire::topics::kSceneMarkers),
       plan_marker_writer_(participant, wire::topics::kPlanMarkers),
+      goal_writer_(participant, wire::topics::kTaskGoal),
       goals_(participant, wire::topics::kTaskGoal, kGoalQueue),
-      cancels_(participant, wire::topics::kTaskCancel, [this](const jostle_msgs::msg::Cancel& cancel) {
-        const std::lock_guard lock(mutex_);
-        if (!goal_id_.empty() && cancel.goal_id() == goal_id_) cancel_.request_stop();
-      }) {
+      cancels_(participant, wire::topics::kTaskCancel,
+               [this](const jostle_msgs::msg::Cancel& told) { cancel(told.goal_id()); }),
+      actions_(participant, work()) {
   feedback_.phase("idle");
+}
+
+ActionServer::Work Coordinator::work() {
+  return {.is_free =
+              [this] {
+                const std::lock_guard lock(mutex_);
+                return goal_id_.empty();
+              },
+          // As anybody's: it comes back to goals_, and recorders have it.
+          .begin = [this](const Goal& goal) { return goal_writer_.write(goal); },
+          .cancel = [this](const std::string& goal_id) { cancel(goal_id); }};
+}
+
+void Coordinator::cancel(const std::string& goal_id) {
+  const std::lock_guard lock(mutex_);
+  if (!goal_id_.empty() && goal_id == goal_id_) cancel_.request_stop();
 }
 
 void Coordinator::run(std::stop_token stop) {
@@ -249,10 +253,13 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   refuser = {};  // whoever asks once he has heard the result is served
   spdlog::info("goal {}: {} {}", id, result.reason(), result.error());
   answer(result, stop);
-  const std::lock_guard lock(mutex_);
-  goal_id_.clear();
-  feedback_.goal_id("");
-  feedback_.phase("idle");
+  {
+    const std::lock_guard lock(mutex_);
+    goal_id_.clear();
+    feedback_.goal_id("");
+    feedback_.phase("idle");
+  }
+  actions_.on_result(result);  // now: whoever hears it may send the next goal at once
 }
 
 // The asker waits for nothing else, so this is tried more than once.
@@ -314,6 +321,7 @@ void Coordinator::refuse_goals_meanwhile(std::stop_token stop) {
       refusal.error(fmt::format("coordinator: busy with goal {}; cancel it or wait", shown(goal_id_)));
     }
     answer(refusal, stop);
+    actions_.on_result(refusal);
   }
 }
 
@@ -368,6 +376,7 @@ void Coordinator::publish_feedback(std::stop_token stop) {
       feedback.workers().push_back(std::move(report));
     }
     (void)feedback_writer_.write(feedback);  // the next one comes in 100 ms
+    if (!feedback.goal_id().empty()) actions_.on_feedback(feedback);
   } while (common::pause_until(steady_clock::now() + kFeedbackPeriod, stop));
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "physics_pool/api/pool.hpp"
+#include "services/task/coordinator/action_server.hpp"
 #include "services/task/session/task.hpp"
 #include "services/wire/dds/display_topics.hpp"
 #include "services/wire/dds/participant.hpp"
@@ -41,7 +42,8 @@ class TroubleBoard {
 };
 
 /// The coordinator performs one task at a time. A goal that arrives meanwhile is refused at once; a
-/// cancelled task ends within a fraction of a second, the robot standing still.
+/// cancelled task ends within a fraction of a second, the robot standing still. Goals come as messages, and as ROS 2
+/// actions (ActionServer).
 ///
 /// Feedback goes out several times a second whether there is news or not, so
 /// that silence means death. What decides a task and what it decides goes out as
@@ -64,6 +66,10 @@ class Coordinator {
     std::vector<jostle_msgs::msg::Observation> seen;  // as the journal was told; entry i became outcome->observed[i]
     Result<void> ended;
   };
+  // What the actions ask for.
+  ActionServer::Work work();
+  void cancel(const std::string& goal_id);
+
   // The world of one goal, as the wire shows it.
   struct Link {
     explicit Link(const wire::Participant& participant) : robot(participant), objects(participant, robot) {}
@@ -96,8 +102,10 @@ class Coordinator {
   wire::Writer<jostle_msgs::msg::Observation> observation_writer_;
   wire::Writer<jostle_msgs::msg::Plan> plan_writer_;
   wire::Writer<visualization_msgs::msg::MarkerArray> scene_marker_writer_, plan_marker_writer_;
+  wire::Writer<Goal> goal_writer_;  // of goals that come as actions
   wire::Inbox<Goal> goals_;
   wire::Reader<jostle_msgs::msg::Cancel> cancels_;
+  ActionServer actions_;
 };
 
 }  // namespace jostle::task

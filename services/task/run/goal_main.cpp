@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "services/common/process/program.hpp"
 #include "services/task/run/display.hpp"
@@ -72,6 +73,18 @@ Result<jostle_msgs::msg::GoalResult> follow(GoalClient& client, common::LiveLine
   return Error{Code::kCancelled, "interrupted; whether the task was cancelled is not known, nobody answered"};
 }
 
+// JSON, which is YAML as well.
+std::string action_text(const jostle_msgs::msg::Goal& goal) {
+  const nlohmann::json fields{{"execution_scene", goal.execution_scene()},
+                              {"planning_scene", goal.planning_scene()},
+                              {"parameters", goal.parameters()},
+                              {"controller", goal.controller()},
+                              {"predictor", goal.predictor()},
+                              {"seed", goal.seed()},
+                              {"plan_only", goal.plan_only()}};
+  return nlohmann::json{{"goal", fields}}.dump();
+}
+
 int perform(const RunOptions& options, double patience, std::stop_token stop) {
   auto participant_result =
       wire::Participant::open({.name = "jostle_goal", .domain = options.domain, .role = wire::Role::kRobot});
@@ -106,13 +119,20 @@ int main(int argc, char** argv) {
   GoalArguments arguments;
   RunOptions options{.pool = ""};
   double patience = 15.0;
+  bool print = false;
   add_goal_options(app, arguments, options);
+  app.add_flag("--print-action", print,
+               "Send nothing: print the goal as `ros2 action send_goal /grasp jostle_msgs/action/Manipulate` wants it");
   app.add_option("--wait", patience, "Seconds to wait for coordinator and world")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 86400.0));
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   const common::StopSignal signal;
   if (auto ok = complete(arguments, options); !ok) return fail(ok.error(), common::exit_code_of(ok.error()));
+  if (print) {
+    fmt::print("{}\n", action_text(make_goal(options)));
+    return common::kExitOk;
+  }
   try {
     return perform(options, patience, signal.token());
   } catch (const wire::SetupError& error) {

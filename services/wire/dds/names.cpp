@@ -8,7 +8,6 @@ namespace jostle::wire {
 namespace {
 
 constexpr std::size_t kLongest = 64;  // characters: names of topics and claims have room for that
-constexpr std::string_view kRoot = "rt/";
 
 }  // namespace
 
@@ -52,8 +51,11 @@ Result<std::string> parse_namespace(const std::string& text) {
 }
 
 std::string in_namespace(const std::string& space, const std::string& topic) {
-  if (space.empty() || !topic.starts_with(kRoot)) return topic;
-  return fmt::format("{}{}/{}", kRoot, space, topic.substr(kRoot.size()));
+  // Of topics, and of requests and replies of services.
+  for (const std::string_view root : {std::string_view("rt/"), std::string_view("rq/"), std::string_view("rr/")}) {
+    if (!space.empty() && topic.starts_with(root)) return fmt::format("{}{}/{}", root, space, topic.substr(root.size()));
+  }
+  return topic;
 }
 
 }  // namespace jostle::wire

@@ -32,7 +32,7 @@ enum class Scope {
 Result<std::string> parse_namespace(const std::string& text);
 
 /// Puts a topic into a namespace: "rt/joint_states" in "left" is "rt/left/joint_states", as ROS 2 has
-/// /left/joint_states.
+/// /left/joint_states; likewise requests (rq/) and replies (rr/) of services.
 std::string in_namespace(const std::string& space, const std::string& topic);
 
 }  // namespace jostle::wire

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <vector>
 
+#include "services/wire/dds/raw_type.hpp"
 #include "services/wire/dds/topics.hpp"
 
 namespace jostle::wire {
@@ -12,13 +13,6 @@ namespace {
 using eprosima::fastdds::dds::TypeSupport;
 using eprosima::fastrtps::rtps::InstanceHandle_t;
 using eprosima::fastrtps::rtps::SerializedPayload_t;
-
-constexpr std::size_t kEncapsulation = 4;  // bytes, RTPS 2.2, 10.5
-
-struct RawSample {
-  std::span<const std::byte> bytes;
-  std::vector<std::byte> own;  // what bytes shows, after reading
-};
 
 // The generated code of a keyed type of ours; empty for every other type.
 TypeSupport keyed_type(const std::string& type) {
@@ -96,10 +90,12 @@ class RawType final : public eprosima::fastdds::dds::TopicDataType {
 
 }  // namespace
 
+TypeSupport raw_type(const std::string& name) { return TypeSupport(new RawType(name)); }
+
 bool can_be_raw(const std::string& type, bool keyed) { return !keyed_type(type).empty() == keyed; }
 
 RawWriter::RawWriter(const Participant& participant, const RawTopic& topic)
-    : WriterBase(participant, topic.name, topic.qos, TypeSupport(new RawType(topic.type))) {}
+    : WriterBase(participant, topic.name, topic.qos, raw_type(topic.type)) {}
 
 bool RawWriter::write(std::span<const std::byte> sample) {
   if (sample.size() < kEncapsulation) return false;
@@ -108,7 +104,7 @@ bool RawWriter::write(std::span<const std::byte> sample) {
 }
 
 RawReader::RawReader(const Participant& participant, const RawTopic& topic, OnSample on_sample)
-    : ReaderBase(participant, topic.name, topic.qos, TypeSupport(new RawType(topic.type)),
+    : ReaderBase(participant, topic.name, topic.qos, raw_type(topic.type),
                  [on_sample = std::move(on_sample)](void* sample, const Origin& origin) {
                    on_sample(static_cast<const RawSample*>(sample)->bytes, origin);
                  }) {}

@@ -98,5 +98,39 @@ TEST_F(Cyclone, HearsMarkersOfSceneAndPlanOfAGoalThatWasTakenUpBefore) {
   }
 }
 
+// As rmw_cyclonedds does it, which is not as rmw_fastrtps does: integration.actions has the latter.
+class CycloneAction : public Cyclone {
+ protected:
+  void SetUp() override {
+    coordinator = program("jostle_coordinator", {"--pool", "threads"});
+    world = program("jostle_sim", {easy});
+  }
+
+  std::map<std::string, std::vector<std::vector<std::string>>> ask(const std::string& parameters,
+                                                                   const std::string& what) {
+    const auto client = program(JOSTLE_CYCLONE_ACTION_CLIENT, {"60", "grasp", easy, parameters, what});
+    EXPECT_EQ(client->wait(kPatience), 0) << client->out() << client->err() << coordinator->err();
+    return facts(client->out());
+  }
+
+  std::unique_ptr<ProgramProcess> coordinator, world;
+};
+
+TEST_F(CycloneAction, IsSentHeardOfAndEndsWithItsResult) {
+  auto heard = ask(plain, "perform");
+  EXPECT_THAT(heard["accepted"], ElementsAre(ElementsAre("1", "1")));
+  EXPECT_THAT(heard["feedback"], ElementsAre(ElementsAre("1")));
+  EXPECT_THAT(heard["result"], ElementsAre(ElementsAre("4", "1", "1", "1"))) << coordinator->err();
+  EXPECT_EQ(heard["status"].back(), std::vector<std::string>{"4"});
+  EXPECT_THAT(heard["others"], ElementsAre(ElementsAre("0"), ElementsAre("1")));
+}
+
+TEST_F(CycloneAction, IsCancelled) {
+  auto heard = ask(endless, "cancel");
+  EXPECT_THAT(heard["cancel"], ElementsAre(ElementsAre("0", "1")));
+  EXPECT_THAT(heard["result"], ElementsAre(ElementsAre("5", "0", "4", "1"))) << coordinator->err();
+  EXPECT_EQ(heard["status"].back(), std::vector<std::string>{"5"});
+}
+
 }  // namespace
 }  // namespace jostle::tests

@@ -123,6 +123,23 @@ TEST(DefinitionsOfIdl, ConstantsOfAMessageStandInFrontOfItsFields) {
   EXPECT_THAT(error("module S_Constants { const octet A = 1; }; struct T { octet a; };"), HasSubstr("wanted struct S"));
 }
 
+TEST(DefinitionsOfIdl, ServicesAndActionsHaveNamesOfTheirOwn) {
+  const auto result = bags::definitions_of_idl(
+      {{"a.idl",
+        "module a { module msg { struct S { octet x; }; };\n"
+        "module srv { struct Add_Request { a::msg::S s; }; struct Add_Response { Add_Request asked; }; }; };"},
+       {"b.idl", "module b { module action { struct Go_Goal { a::srv::Add_Request request; }; }; };"}});
+  ASSERT_TRUE(result) << result.error().message;
+  const std::string line(80, '=');
+  EXPECT_EQ(result->at("a/srv/Add_Request"), "a/S s\n" + line + "\nMSG: a/S\nuint8 x\n");
+  EXPECT_THAT(result->at("a/srv/Add_Response"), StartsWith("a/srv/Add_Request asked\n" + line));
+  EXPECT_THAT(result->at("b/action/Go_Goal"), StartsWith("a/srv/Add_Request request\n"));
+  const auto sut = taken(Decoder::create("b/action/Go_Goal", result->at("b/action/Go_Goal")));
+  EXPECT_EQ(taken(sut.decode(Cdr().add(std::uint8_t{7}).bytes())).dump(), R"({"request":{"s":{"x":7}}})");
+  EXPECT_THAT(bags::definitions_of_idl({{"a.idl", "module a { module other { }; };"}}).error().message,
+              HasSubstr("got 'other', wanted module msg, srv or action"));
+}
+
 TEST(DefinitionOf, ResultsSaysWhatItsNumbersMean) {
   EXPECT_THAT(definition_of("jostle_msgs/msg/GoalResult").value(), HasSubstr("uint8 TIMED_OUT=3\n"));
 }

@@ -19,6 +19,9 @@ TEST(Namespace, ComesBeforeTheNameThatRos2Shows) {
   EXPECT_EQ(in_namespace("", "rt/tf"), "rt/tf");
   EXPECT_EQ(in_namespace("left", "rt/objects/poses"), "rt/left/objects/poses");
   EXPECT_EQ(in_namespace("lab/left", "rt/tf"), "rt/lab/left/tf");
+  EXPECT_EQ(in_namespace("left", "rq/grasp/_action/send_goalRequest"), "rq/left/grasp/_action/send_goalRequest");
+  EXPECT_EQ(in_namespace("left", "rr/grasp/_action/send_goalReply"), "rr/left/grasp/_action/send_goalReply");
+  EXPECT_EQ(in_namespace("left", "ros_discovery_info"), "ros_discovery_info");
 }
 
 class BadNamespace : public ::testing::TestWithParam<const char*> {};

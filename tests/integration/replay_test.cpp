@@ -85,6 +85,36 @@ TEST_F(RecordedRuns, OfTaskAdaptiveControlDecideTheSameOnThreadsOnWorkersAndAgai
   EXPECT_THAT(out, HasSubstr("adaptive.noise: recorded 0.1, replayed 0"));
 }
 
+// The next action is planned while the robot acts, from a predicted state; some of these plans are taken, and some not.
+TEST_F(RecordedRuns, ThatPlannedWhileActingDecideTheSameOnThreadsOnWorkersAndAgain) {
+  const auto scene_result = physics_pool::generate_chapter5({.task = physics_pool::AdaptiveTask::kStrip, .seed = 11});
+  ASSERT_TRUE(scene_result) << scene_result.error().message;
+  const auto scene = folder.write("strip.yaml", physics_pool::to_yaml(*scene_result));
+  const auto parameters = folder.write("few.yaml",
+                                       "control: {plan_while_acting: 0.01}\n"
+                                       "adaptive: {sequences: 3, samples: 4, max_actions: 5}\n"
+                                       "objective: {success_cost: 0}\n");
+  std::vector<json> reports;
+  for (const char* pool : {"threads", "dds"}) {
+    const std::string file = folder.path() / (std::string(pool) + ".json");
+    finish({scene, "--controller", "tampc", "--noise", "0.1", "--seed", "3", "--parameters", parameters, "--workers",
+            "2", "--pool", pool, "--json", file, "--record", bag(pool)});
+    reports.push_back(json::parse(contents(file)));
+  }
+  for (const char* same : {"controls", "observed_states", "rollouts", "plans_while_acting", "taken_while_acting"}) {
+    EXPECT_EQ(reports[0][same], reports[1][same]) << same;
+  }
+  EXPECT_GE(reports[1]["taken_while_acting"], 1) << run->err();
+  EXPECT_LT(reports[1]["taken_while_acting"], reports[1]["plans_while_acting"]);
+  EXPECT_EQ(reports[1]["idle"]["seconds"].size(), reports[1]["actions"]);
+  EXPECT_THAT(run->out(), HasSubstr("plans begun while acting"));
+
+  EXPECT_EQ(program_ends("jostle_replay", {bag("dds")}), 0) << out << err;
+  EXPECT_THAT(out, HasSubstr("BIT-EQUAL"));
+  EXPECT_EQ(program_ends("jostle_replay", {bag("dds"), "--set", "control.plan_while_acting=0"}), 1) << err;
+  EXPECT_THAT(out, HasSubstr("control.plan_while_acting: recorded 0.01, replayed 0"));
+}
+
 TEST_F(RecordedRuns, DecideTheSameAgainToTheLastBit) {
   record("run");
   const json report = json::parse(contents(folder.path() / "run.json"));

@@ -1,5 +1,5 @@
-// The controllers of Chapter 4: the same decisions on any pool and in a replay. They and guided planning: the same
-// plans, whatever happens to workers.
+// The controllers of Chapter 4: the same decisions on any pool and in a replay. They, those of Chapter 5 and guided
+// planning: the same plans, whatever happens to workers.
 
 #include <gmock/gmock.h>
 
@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "physics_pool/local/thread_pool.hpp"
+#include "planners/adaptive/adaptive_planner.hpp"
 #include "planners/guided/guided.hpp"
 #include "planners/robustness/robust_sto.hpp"
 #include "services/pool/client/remote_pool.hpp"
@@ -83,6 +84,14 @@ std::unique_ptr<planners::Planner> guided(physics_pool::Pool& pool, const physic
   return planners::GuidedPlanner::make(pool, scene, {}, {.candidates = 30, .judged = 4}).value();
 }
 
+// As tampc decides.
+std::unique_ptr<planners::Planner> adaptive(physics_pool::Pool& pool, const physics_pool::Scene&,
+                                            const physics_pool::TaskGeometry& geometry) {
+  return std::make_unique<planners::AdaptivePlanner>(
+      pool, geometry, planners::PbstoOptions{.rollouts = 6, .step_duration = 0.2},
+      planners::AdaptiveOptions{.sequences = 4, .samples = 6, .iterations = 3, .rest = 0.1, .step_duration = 0.2});
+}
+
 class Plans : public ::testing::TestWithParam<Planning> {
  protected:
   planners::Plan plan_on(physics_pool::Pool& pool) const {
@@ -126,6 +135,7 @@ TEST_P(Plans, AreTheSameWhenAWorkerIsKilledInMidIterationAndReplaced) {
   EXPECT_EQ(got.states, wanted.states);
   EXPECT_EQ(got.cost, wanted.cost);
   EXPECT_EQ(got.rollouts, wanted.rollouts);
+  EXPECT_EQ(got.choices, wanted.choices);
   EXPECT_EQ(got.robustness, wanted.robustness);
   EXPECT_EQ(got.robustness.has_value(), GetParam().weighs);
 }
@@ -134,7 +144,8 @@ INSTANTIATE_TEST_SUITE_P(Planners, Plans,
                          ::testing::Values(Planning{"by_cost", 4, false, &robust<0, 0>},
                                            Planning{"in_one_world", 4, true, &robust<3, 0>},
                                            Planning{"in_several_worlds", 4, true, &robust<3, 2>},
-                                           Planning{"guided", 2, false, &guided}),
+                                           Planning{"guided", 2, false, &guided},
+                                           Planning{"adaptive", 4, false, &adaptive}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

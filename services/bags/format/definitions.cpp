@@ -366,15 +366,21 @@ std::optional<std::string> definition_of(const std::string& type) {
 }
 
 std::optional<std::string> earlier_definition_of(const std::string& type) {
-  static const std::map<std::string, std::string> kAppended{{"jostle_msgs/msg/GoalResult", "uint8 ending"},
-                                                            {"jostle_msgs/msg/RobotStatus", "float64[] limits"},
-                                                            {"jostle_msgs/msg/WorkerHeartbeat", "uint64 refused"}};
+  static const std::map<std::string, std::vector<std::string>> kAppended{
+      {"jostle_msgs/msg/Feedback", {"float64 idle"}},
+      {"jostle_msgs/msg/GoalResult", {"uint8 ending"}},
+      {"jostle_msgs/msg/Observation", {"float64 idle"}},
+      {"jostle_msgs/msg/Plan", {"float64 deviation", "bool while_acting"}},
+      {"jostle_msgs/msg/RobotStatus", {"float64[] limits"}},
+      {"jostle_msgs/msg/WorkerHeartbeat", {"uint64 refused"}}};
   const auto appended = kAppended.find(type);
   std::optional<std::string> definition = definition_of(type);
   if (appended == kAppended.end() || !definition) return {};
-  const std::size_t line = definition->find(appended->second);
-  if (line == std::string::npos) return {};
-  definition->erase(line, definition->find('\n', line) + 1 - line);
+  for (const std::string& field : appended->second) {
+    const std::size_t line = definition->find(field);
+    if (line == std::string::npos) return {};
+    definition->erase(line, definition->find('\n', line) + 1 - line);
+  }
   return definition;
 }
 

@@ -20,8 +20,8 @@ namespace jostle::bags {
 /// nothing for other types.
 std::optional<std::string> definition_of(const std::string& type);
 
-/// Returns the definition without the field that was appended since bags were first recorded, for old bags of our
-/// recorder in rosbag2's storage, which bring no definitions. Nothing if no field was appended.
+/// Returns the definition without the fields that were appended since bags were first recorded, for old bags of our
+/// recorder in rosbag2's storage, which bring no definitions. Nothing if none was appended.
 std::optional<std::string> earlier_definition_of(const std::string& type);
 
 /// Returns the ROS 2 name of a type that is written in another way: pkg/Name or pkg::msg::dds_::Name_ for

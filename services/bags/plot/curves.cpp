@@ -1,6 +1,7 @@
 #include "services/bags/plot/curves.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "physics_pool/scene/scene.hpp"
 #include "physics_pool/task/task_geometry.hpp"
@@ -33,6 +34,18 @@ Curve cost_of(const RecordedRun& run, const RecordedMotion& motion) {
   return curve;
 }
 
+// Rests and what the fingers do are no actions, and have none.
+Curve idle_of(const RecordedRun& run, const RecordedMotion& motion) {
+  Curve curve;
+  bool is_first = true;
+  for (const jostle_msgs::msg::Observation& seen : run.observations) {
+    if (seen.idle() <= 0 || std::exchange(is_first, false)) continue;
+    curve.time.push_back(std::max(0.0, world::seconds(seen.header()) - motion.world_begin()));
+    curve.value.push_back(seen.idle());
+  }
+  return curve;
+}
+
 }  // namespace
 
 Result<RunCurves> curves_of(BagReader& reader, const RecordedRun& run) {
@@ -45,6 +58,7 @@ Result<RunCurves> curves_of(BagReader& reader, const RecordedRun& run) {
   const RecordedMotion& motion = *motion_result;
 
   RunCurves curves{.task = geometry.kind->name, .has_goal = geometry.kind->has_goal, .cost = cost_of(run, motion)};
+  curves.idle = idle_of(run, motion);
   curves.unreadable = motion.unreadable();
   const double step = motion.duration() / kPoints;
   std::optional<State> before;

@@ -25,6 +25,7 @@ struct RunCurves {
   Curve hand_speed;              ///< m/s, of the hand's frame
   std::uint64_t unreadable = 0;  ///< states of the bag that cannot be read
   Curve target_speed;            ///< m/s, of the target's centre
+  Curve idle;  ///< s that the robot stood still before each action but the first, at the action's end; none of old bags
 };
 
 /// Makes the curves of a run.

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kExample =
     "Examples\n"
-    "  jostle bag plot run1                       run1.png: costs, distance and speeds over time\n"
+    "  jostle bag plot run1                       run1.png: costs, distance, speeds and idle times\n"
     "  jostle bag plot run1 -o run1.pdf --goal chapter3-15-7-1\n"
     "Exit codes: 0 drawn, 2 wrong arguments, or a bag without such a run, 3 the picture cannot be written.";
 
@@ -37,18 +37,20 @@ common::Band band_of(const std::string& name, const Curve* curve) {
   return {name, is_drawn ? curve->time : std::vector<double>{0.0}, value, value, value};
 }
 
-// A panel of the three curves, some of which may not belong into it.
-common::Panel panel_of(const std::string& y_label, const Curve* cost, const Curve* target, const Curve* hand) {
+// A panel of curves, some of which may not belong into it.
+common::Panel panel_of(const std::string& y_label, const Curve* cost, const Curve* target, const Curve* hand,
+                       const Curve* robot = nullptr) {
   return {.x_label = "time on the world's clock (s)",
           .y_label = y_label,
-          .bands = {band_of("plan", cost), band_of("target", target), band_of("hand", hand)}};
+          .bands = {band_of("plan", cost), band_of("target", target), band_of("hand", hand), band_of("robot", robot)}};
 }
 
 std::vector<common::Panel> panels_of(const RunCurves& curves) {
   const std::string distance = fmt::format("distance of the target to the {} (m)", curves.has_goal ? "goal" : "hand");
   return {panel_of("cost of the plan", &curves.cost, nullptr, nullptr),
           panel_of(distance, nullptr, &curves.distance, nullptr),
-          panel_of("speed (m/s)", nullptr, &curves.target_speed, &curves.hand_speed)};
+          panel_of("speed (m/s)", nullptr, &curves.target_speed, &curves.hand_speed),
+          panel_of("stands still before an action (s)", nullptr, nullptr, nullptr, &curves.idle)};
 }
 
 Result<RecordedRun> run_of(BagReader& reader, const std::string& goal) {
@@ -97,8 +99,10 @@ fs::path default_picture(const fs::path& bag) {
 
 int main(int argc, char** argv) {
   using namespace jostle;
-  CLI::App app{"Draws a recorded run over time: the cost of its plans, the distance of the target, speeds.",
-               "jostle bag plot"};
+  CLI::App app{
+      "Draws a recorded run over time: the cost of its plans, the distance of the target, speeds, and how long the "
+      "robot stood still.",
+      "jostle bag plot"};
   app.footer(bags::kExample);
   std::string bag, picture, goal;
   app.add_option("bag", bag, "a bag's folder, or one of its files")->required();

@@ -15,6 +15,32 @@ using jostle_msgs::msg::Observation;
 using jostle_msgs::msg::Plan;
 using jostle_msgs::msg::TaskRun;
 
+// Reads a T as it is now, or as it was before fields were appended, of at most so many bytes with what aligns them: the
+// old layout with zeros behind it is the new one. `complete` gives them their values.
+template <class T, class Complete>
+Result<T> from_cdr_or_earlier(std::span<const std::byte> data, std::size_t appended, const Complete& complete) {
+  auto result = wire::from_cdr<T>(data);
+  if (result) return result;
+  std::vector<std::byte> longer(data.begin(), data.end());
+  longer.resize(longer.size() + appended);
+  auto earlier_result = wire::from_cdr<T>(longer);
+  if (!earlier_result) return result;
+  complete(*earlier_result);
+  return earlier_result;
+}
+
+Result<Observation> observation_from_cdr(std::span<const std::byte> data) {
+  return from_cdr_or_earlier<Observation>(data, 15, [](Observation& seen) { seen.idle(0.0); });
+}
+
+// Before there were plans that were made while acting.
+Result<Plan> plan_from_cdr(std::span<const std::byte> data) {
+  return from_cdr_or_earlier<Plan>(data, 16, [](Plan& plan) {
+    plan.deviation(-1.0);
+    plan.while_acting(false);
+  });
+}
+
 std::vector<int> topics_of(const BagInfo& info) {
   std::vector<int> topics;
   for (std::size_t i = 0; i < info.topics.size(); ++i) {
@@ -49,7 +75,7 @@ class Collector {
 
   Result<void> take(const std::string& type, const Message& message) {
     if (type == "jostle_msgs/msg/TaskRun") {
-      return with<TaskRun>(message, [&](TaskRun run) {
+      return with(wire::from_cdr<TaskRun>(message.data), [&](TaskRun run) {
         const std::string id = run.goal().goal_id();
         if (parts_[id].run) return;
         order_.push_back(id);
@@ -58,13 +84,13 @@ class Collector {
       });
     }
     if (type == "jostle_msgs/msg/Observation") {
-      return with<Observation>(message, [&](Observation seen) {
+      return with(observation_from_cdr(message.data), [&](Observation seen) {
         parts_[seen.goal_id()].observations.try_emplace(seen.number(), std::move(seen), message.log_time);
       });
     }
     if (type == "jostle_msgs/msg/Plan") {
-      return with<Plan>(message,
-                        [&](Plan plan) { parts_[plan.goal_id()].plans.try_emplace(plan.number(), std::move(plan)); });
+      return with(plan_from_cdr(message.data),
+                  [&](Plan plan) { parts_[plan.goal_id()].plans.try_emplace(plan.number(), std::move(plan)); });
     }
     auto result = result_from_cdr(message.data);
     if (!result) return result.error();
@@ -98,8 +124,7 @@ class Collector {
 
  private:
   template <class T, class Use>
-  static Result<void> with(const Message& message, const Use& use) {
-    auto result = wire::from_cdr<T>(message.data);
+  static Result<void> with(Result<T> result, const Use& use) {
     if (!result) return result.error();
     use(std::move(result).value());
     return {};
@@ -150,13 +175,7 @@ class Collector {
 }  // namespace
 
 Result<GoalResult> result_from_cdr(std::span<const std::byte> data) {
-  auto result = wire::from_cdr<GoalResult>(data);
-  if (result) return result;
-  // The octet needs no alignment: with a zero behind it, the old layout is the new one.
-  std::vector<std::byte> longer(data.begin(), data.end());
-  longer.push_back(static_cast<std::byte>(planners::Ending::kUnknown));
-  auto old_result = wire::from_cdr<GoalResult>(longer);
-  return old_result ? old_result : result;
+  return from_cdr_or_earlier<GoalResult>(data, 1, [](GoalResult&) {});
 }
 
 planners::Ending ending_of(const GoalResult& result) {

@@ -79,8 +79,15 @@ std::optional<Difference> compare_given(const Plan& a, const Plan& b) {
     difference.replayed = fmt::format("after action {}", b.observation());
     return difference;
   }
+  if (differs("made while acting", a.while_acting(), b.while_acting())) return difference;
+  if (!same_bits(a.deviation(), b.deviation())) {
+    difference.field = "distance of what was observed from what had been predicted";
+    difference.recorded = number(a.deviation(), "m");
+    difference.replayed = number(b.deviation(), "m");
+    return difference;
+  }
   if (!same_bits(a.q(), b.q()) || !same_bits(a.v(), b.v())) {
-    difference.field = "start state, made feasible";
+    difference.field = a.while_acting() ? "predicted start state" : "start state, made feasible";
     difference.recorded = difference.replayed = "the same observation";
     return difference;
   }

@@ -9,8 +9,10 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "services/common/charts/statistics.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/process/trouble.hpp"
+#include "services/common/results/results.hpp"
 #include "services/task/coordinator/goal_texts.hpp"
 #include "services/task/coordinator/markers.hpp"
 #include "services/task/session/phases.hpp"
@@ -106,6 +108,14 @@ void tell(wire::Writer<T>& writer, const T& message, const std::string& what) {
   }
 }
 
+// What the robot stood still, s: before each action, and over all but the first, which waits for the first plan.
+nlohmann::json idle_of(const planners::Outcome& outcome) {
+  const std::vector<double> between = planners::idle_between(outcome);
+  return {{"seconds", outcome.idle},
+          {"median", common::number_or_null(common::median(between))},
+          {"p90", common::number_or_null(common::quantile(between, 0.9))}};
+}
+
 nlohmann::json rows(const ControlSequence& controls) {
   nlohmann::json rows = nlohmann::json::array();
   for (int t = 0; t < controls.steps(); ++t) rows.push_back(controls.step(t));
@@ -132,6 +142,10 @@ std::string report_of(const planners::Outcome& outcome, const Task& task, std::u
                         {"planning_seconds", outcome.planning_time.count()},
                         {"total_seconds", outcome.total_time.count()},
                         {"rollouts", outcome.rollouts},
+                        {"abandoned_rollouts", outcome.abandoned_rollouts},
+                        {"plans_while_acting", outcome.plans_ahead},
+                        {"taken_while_acting", outcome.taken_ahead},
+                        {"idle", idle_of(outcome)},
                         {"used_workers", apportion(used, outcome.rollouts)},
                         {"dropped_objects", outcome.dropped},
                         {"step_duration", task.parameters().planner.step_duration},
@@ -334,7 +348,8 @@ void Coordinator::note(const planners::ControlEvent& event, const physics_pool::
     feedback_.speed(event.plan->choices[static_cast<std::size_t>(event.plan->chosen)].speed);
   }
   feedback_.segments(planners::to_text(event.outcome.segments, event.outcome.segment));
-  if (event.phase == planners::Phase::kPlanning) rollouts_before_ = feedback_.rollouts();
+  rollouts_before_ = event.outcome.rollouts + event.outcome.abandoned_rollouts;
+  if (!event.outcome.idle.empty()) feedback_.idle(event.outcome.idle.back());
   if (event.observed && !event.observed->q.empty()) {
     feedback_.target_distance(geometry.kind->distance(geometry, *event.observed));
   }

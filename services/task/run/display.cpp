@@ -47,6 +47,7 @@ std::string Display::text(const jostle_msgs::msg::Feedback& feedback) {
   if (feedback.speed() > 0) {  // of controllers that choose one
     parts.insert(parts.begin() + kAfterTarget, {fmt::format("speed {:>5.1f} cm/s", 100 * feedback.speed()), 1});
   }
+  if (feedback.actions() > 0) parts.push_back({fmt::format("idle {:.2f} s", feedback.idle()), 4});
   // Of controllers that look only where they must.
   if (!feedback.segments().empty()) parts.push_back({feedback.segments(), 1});
   parts.insert(parts.end(), workers.begin(), workers.end());

@@ -152,6 +152,12 @@ void print_summary(const RunOptions& options, const json& report) {
   }
   fmt::print(out, "  execution    {} actions, {} re-plans, {:.1f} s in all\n", report["actions"].get<int>(),
              report["replans"].get<int>(), report["total_seconds"].get<double>());
+  if (!report["idle"]["median"].is_null()) {
+    fmt::print(out,
+               "  idle         {:.2f} s before an action (90 %: {:.2f} s); {} plans begun while acting, {} taken\n",
+               report["idle"]["median"].get<double>(), report["idle"]["p90"].get<double>(),
+               report["plans_while_acting"].get<int>(), report["taken_while_acting"].get<int>());
+  }
   fmt::print(out, "  physics      {} rollouts on {} {}, controller {}\n", report["rollouts"].get<std::uint64_t>(),
              report["used_workers"].size(), options.pool == "threads" ? "threads" : "workers", options.controller);
   for (const ParameterDifference& change : options.changed) {

@@ -15,10 +15,12 @@ void Journal::saw(const std::vector<perception::ObjectReading>& objects) {
   message.number(observations_++);
   message.command(std::exchange(command_, {}));
   message.duration(std::exchange(duration_, 0.0));
+  message.idle(std::exchange(idle_, 0.0));
   if (listener_.on_observation) listener_.on_observation(message);
 }
 
-void Journal::planned(const planners::Problem& problem, const planners::Plan& plan) {
+void Journal::planned(const planners::Problem& problem, const planners::Plan& plan,
+                      const planners::PlanOrigin& origin) {
   jostle_msgs::msg::Plan message;
   message.header(world::make_header(time_ ? time_() : 0.0));
   message.goal_id(goal_id_);
@@ -38,6 +40,8 @@ void Journal::planned(const planners::Problem& problem, const planners::Plan& pl
   message.at_goal(plan.at_goal);
   message.iterations(plan.iterations);
   message.rollouts(plan.rollouts);
+  message.deviation(origin.deviation.value_or(-1.0));
+  message.while_acting(origin.while_acting);
   if (listener_.on_plan) listener_.on_plan(message);
 }
 
@@ -71,13 +75,6 @@ Result<std::vector<perception::ObjectReading>> Journal::Objects::read() {
   auto objects_result = objects_.read();
   if (objects_result) journal_.saw(*objects_result);
   return objects_result;
-}
-
-Result<planners::Plan> Journal::Planner::plan(const planners::Problem& problem, planners::TimePoint deadline,
-                                              std::stop_token stop) {
-  auto plan_result = planner_.plan(problem, deadline, std::move(stop));
-  if (plan_result) journal_.planned(problem, *plan_result);
-  return plan_result;
 }
 
 }  // namespace jostle::task

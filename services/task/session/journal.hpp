@@ -7,15 +7,15 @@
 
 #include "idl/msg/task.h"
 #include "perception/api/object_source.hpp"
-#include "planners/api/planner.hpp"
+#include "planners/execution/execution.hpp"
 #include "robot_bridge/api/robot.hpp"
 
 namespace jostle::task {
 
-/// A Journal stands between a controller and its three ports, and tells what passes. Neither
-/// the controller nor the ports notice.
+/// A Journal stands between a controller and its two ports, and tells what passes. Neither
+/// the controller nor the ports notice. Of plans it is told.
 ///
-/// An observation is told of once its objects were read, a plan once it was made;
+/// An observation is told of once its objects were read, a plan once it was taken up;
 /// both carry a number that counts up from 0, so that whoever misses one knows.
 ///
 /// Threads  the controller's; listeners are called on it.
@@ -35,11 +35,14 @@ class Journal {
   // The ports to give to the controller; the real ones behind them outlive it.
   class Robot;
   class Objects;
-  class Planner;
+
+  /// To be called for every plan that a controller takes up, after the observation that it acts upon.
+  void planned(const planners::Problem& problem, const planners::Plan& plan, const planners::PlanOrigin& origin);
+  /// To be called when an action begins: how long the robot stood still before it, s.
+  void idled(double seconds) { idle_ = seconds; }
 
  private:
   void saw(const std::vector<perception::ObjectReading>& objects);
-  void planned(const planners::Problem& problem, const planners::Plan& plan);
 
   const std::string goal_id_;
   const double step_duration_;  // s
@@ -48,6 +51,7 @@ class Journal {
   std::uint32_t observations_ = 0, plans_ = 0;
   std::vector<double> command_;  // since the last observation
   double duration_ = 0.0;        // s
+  double idle_ = 0.0;            // s
   robot_bridge::RobotReading reading_;
 };
 
@@ -73,17 +77,6 @@ class Journal::Objects final : public perception::ObjectSource {
  private:
   Journal& journal_;
   perception::ObjectSource& objects_;
-};
-
-class Journal::Planner final : public planners::Planner {
- public:
-  Planner(Journal& journal, planners::Planner& planner) : journal_(journal), planner_(planner) {}
-  Result<planners::Plan> plan(const planners::Problem& problem, planners::TimePoint deadline,
-                              std::stop_token stop) override;
-
- private:
-  Journal& journal_;
-  planners::Planner& planner_;
 };
 
 }  // namespace jostle::task

@@ -45,13 +45,17 @@ Result<planners::Outcome> Task::perform(robot_bridge::Robot& robot, perception::
   Journal journal(goal_id_, run_.parameters().planner.step_duration, watch.time, watch.journal);
   Journal::Robot journal_robot(journal, robot);
   Journal::Objects journal_objects(journal, objects);
-  return run_.perform(
-      journal_robot, journal_objects,
-      {.on_event = watch.on_event,
-       .on_progress = watch.on_progress,
-       .around_planner =
-           [&](planners::Planner& planner) { return std::make_unique<Journal::Planner>(journal, planner); }},
-      std::move(stop));
+  return run_.perform(journal_robot, journal_objects,
+                      {.on_event =
+                           [&](const planners::ControlEvent& event) {
+                             if (event.phase == planners::Phase::kActing) journal.idled(event.outcome.idle.back());
+                             if (watch.on_event) watch.on_event(event);
+                           },
+                       .on_progress = watch.on_progress,
+                       .around_planner = {},
+                       .on_plan = [&](const planners::Problem& problem, const planners::Plan& plan,
+                                      const planners::PlanOrigin& origin) { journal.planned(problem, plan, origin); }},
+                      std::move(stop));
 }
 
 jostle_msgs::msg::TaskRun describe_run(const jostle_msgs::msg::Goal& goal) {

@@ -6,6 +6,7 @@
 
 #include "physics_pool/objective/scorer.hpp"
 #include "robot_bridge/safety/command_check.hpp"
+#include "services/common/process/program.hpp"
 
 namespace jostle::world {
 
@@ -46,7 +47,8 @@ Result<void> SimulatedRobot::start(std::span<const double> u, double duration, s
     return ok;
   if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped before it moved"};
   world_.begin(u);
-  steps_left_ = std::lround(duration / world_.world().time_step());
+  began_ = std::chrono::steady_clock::now();
+  steps_ = steps_left_ = std::lround(duration / world_.world().time_step());
   return {};
 }
 
@@ -56,6 +58,12 @@ Result<bool> SimulatedRobot::advance(std::stop_token stop) {
   if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped in mid-action"};
   if (auto ok = world_.step(); !ok) return ok.error();
   steps_left_ = left - 1;
+  if (rate_ > 0) {
+    const auto done = static_cast<double>(steps_ - steps_left_);
+    const std::chrono::duration<double> since(done * world_.world().time_step() / rate_);
+    // A stop is seen by the next step.
+    (void)common::pause_until(began_ + std::chrono::duration_cast<std::chrono::nanoseconds>(since), std::move(stop));
+  }
   return steps_left_ == 0;
 }
 

@@ -3,6 +3,8 @@
 /// An execution world in this process behind the two ports: for studies, where
 /// the wire would only add noise to the clock.
 
+#include <chrono>
+
 #include "perception/api/object_source.hpp"
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/scene/scene.hpp"
@@ -21,7 +23,8 @@ robot_bridge::RobotReading robot_reading(const physics_pool::ExecutionWorld& wor
 /// in the thesis's simulation experiments.
 class SimulatedRobot final : public robot_bridge::Robot {
  public:
-  explicit SimulatedRobot(physics_pool::ExecutionWorld& world) : world_(world) {}
+  /// `rate`: world seconds per second while acting, at most; 0: as fast as the world can be simulated.
+  explicit SimulatedRobot(physics_pool::ExecutionWorld& world, double rate = 0.0) : world_(world), rate_(rate) {}
 
   Result<robot_bridge::RobotReading> read(std::stop_token stop = {}) override;
   Result<void> start(std::span<const double> u, double duration, std::stop_token stop = {}) override;
@@ -29,7 +32,9 @@ class SimulatedRobot final : public robot_bridge::Robot {
 
  private:
   physics_pool::ExecutionWorld& world_;
-  long steps_left_ = 0;  // engine steps of the action at work
+  const double rate_;
+  std::chrono::steady_clock::time_point began_;  // the action at work
+  long steps_ = 0, steps_left_ = 0;              // engine steps of the action at work
 };
 
 /// Sees the objects of an execution world as observed_state does: the initial

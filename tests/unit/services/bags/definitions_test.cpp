@@ -153,7 +153,9 @@ TEST(EarlierDefinitionOf, DecodesWhatWasRecordedBeforeAFieldWasAppended) {
             R"({"goal_id":"goal","success":true,"reason":"target grasped","error":"","report":"{}"})");
   EXPECT_THAT(bags::earlier_definition_of("jostle_msgs/msg/WorkerHeartbeat").value(),
               AllOf(HasSubstr("ClientLoad[] clients"), Not(HasSubstr("refused"))));
-  EXPECT_FALSE(bags::earlier_definition_of("jostle_msgs/msg/Plan"));
+  EXPECT_THAT(bags::earlier_definition_of("jostle_msgs/msg/Plan").value(),
+              AllOf(HasSubstr("uint64 rollouts\n"), Not(HasSubstr("deviation")), Not(HasSubstr("while_acting"))));
+  EXPECT_FALSE(bags::earlier_definition_of("jostle_msgs/msg/Goal"));
 }
 
 TEST(DecoderTest, DecodesEveryKindOfFieldInBothByteOrders) {

@@ -5,6 +5,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "physics_pool/local/thread_pool.hpp"
 #include "services/bags/replay/report.hpp"
 #include "services/task/session/task.hpp"
@@ -104,6 +106,31 @@ TEST_F(Replay, DecidesTheSameToTheLastBit) {
     EXPECT_EQ(report.comparison.equal_actions, recorded.observations.size() - 1);
     EXPECT_EQ(report.decisions.plans.size(), recorded.plans.size());
     EXPECT_THAT(verdict(recorded, report), HasSubstr("BIT-EQUAL"));
+  }
+}
+
+// From a prediction, on a thread beside the one that acts; on two threads here, and on one there.
+TEST_F(Replay, MakesPlansAgainThatWereMadeWhileActing) {
+  jostle_msgs::msg::Goal restless = grasp();
+  std::string parameters = restless.parameters();
+  parameters.replace(parameters.find("timeout"), 0, "plan_while_acting: 0.004, ");
+  restless.parameters(parameters);
+  jostle_msgs::msg::Goal foresees = push();
+  foresees.parameters(foresees.parameters() + "control: {plan_while_acting: 0.004}\n");
+  for (const RecordedRun& recorded : {record(restless), record(foresees)}) {
+    SCOPED_TRACE(recorded.run.goal().goal_id());
+    const auto taken = std::ranges::count_if(recorded.plans, [](const auto& plan) { return plan.while_acting(); });
+    EXPECT_GE(taken, 1);
+    EXPECT_LT(recorded.plans.front().deviation(), 0.0);
+
+    const ReplayReport report = again(recorded);
+
+    EXPECT_TRUE(report.comparison.bit_equal()) << verdict(recorded, report);
+    EXPECT_EQ(report.comparison.equal_plans, recorded.plans.size());
+
+    const ReplayReport otherwise = again(recorded, {"control.plan_while_acting=0"});
+    ASSERT_FALSE(otherwise.comparison.bit_equal());
+    EXPECT_THAT(verdict(recorded, otherwise), HasSubstr("control.plan_while_acting: recorded 0.004, replayed 0"));
   }
 }
 

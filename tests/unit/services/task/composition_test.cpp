@@ -4,6 +4,7 @@
 
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/local/thread_pool.hpp"
+#include "physics_pool/scenarios/chapter5.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 #include "tests/support/scenes.hpp"
 
@@ -48,6 +49,37 @@ TEST(Composition, PlansWithoutGuidanceForAHandThatCoarsePhysicsCannotShow) {
   physics_pool::Scene scene = three_objects();
   scene.robot.model.links[0].geoms[0].pose.orientation = {0.995, 0.0998, 0.0, 0.0};  // tilted by 0.2 rad
   EXPECT_FALSE(is_guided(scene, guided_by(60)));
+}
+
+// Physics predicts the world that it simulates: every plan that was made while acting is used. A rest is part of an
+// action.
+TEST(Composition, PlansWhileActingFromWhatAnActionComesTo) {
+  const auto scene_result = physics_pool::generate_chapter5({.task = physics_pool::AdaptiveTask::kStrip, .seed = 11});
+  ASSERT_TRUE(scene_result);
+  task::Parameters parameters = task::parse_parameters(
+                                    "planner: {rollouts: 2, sigma: [0.02, 0.02, 0.1, 0], limit: [0.5, 0.5, 1, 0.05]}\n"
+                                    "adaptive: {sequences: 2, least_actions: 5, most_actions: 6, samples: 2, "
+                                    "iterations: 0, max_actions: 4}\n"
+                                    "control: {plan_while_acting: 0.001}\n",
+                                    "test")
+                                    .value();
+  physics_pool::ThreadPool pool(1);
+  auto sut_result = task::Composition::make(
+      {.belief = *scene_result, .belief_is_exact = true, .parameters = parameters, .controller = "tampc"}, pool);
+  ASSERT_TRUE(sut_result) << sut_result.error().message;
+  physics_pool::ExecutionWorld world(physics_pool::World::compile(*scene_result).value());
+  world::SimulatedRobot robot(world);
+  world::SimulatedObjects objects(world, *scene_result);
+  std::vector<planners::PlanOrigin> origins;
+  const auto outcome_result =
+      sut_result->perform(robot, objects,
+                          {.on_plan = [&](const planners::Problem&, const planners::Plan&,
+                                          const planners::PlanOrigin& origin) { origins.push_back(origin); }},
+                          {});
+  ASSERT_TRUE(outcome_result) << outcome_result.error().message;
+  EXPECT_EQ(outcome_result->taken_ahead, 3);
+  ASSERT_EQ(origins.size(), 4u);
+  for (std::size_t i = 1; i < 4; ++i) EXPECT_LT(origins[i].deviation.value_or(1.0), 1e-4);
 }
 
 TEST(Composition, RefusesGuidanceForAControllerWithAPlannerOfItsOwn) {

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
 #include <cmath>
 
 #include "tests/support/scenes.hpp"
@@ -45,6 +46,17 @@ TEST(InProcessPush, PusherHasTwoJointsAndFeelsNothing) {
   EXPECT_EQ(reading->object_in_hand, std::nullopt);
   EXPECT_FALSE(sut.execute(std::vector{0.1, 0.0, 0.0, 0.0}, 0.1, {}));
   EXPECT_TRUE(sut.execute(std::vector{0.1, 0.0}, 0.1, {}));
+}
+
+TEST_F(InProcessWorld, RobotKeepsTimeWithTheClockWhenToldTo) {
+  const std::vector<double> u{0.1, 0.05, 0.2, -0.01};
+  physics_pool::ExecutionWorld other(world);
+  SimulatedRobot at_once(other), sut(execution, 2.0);
+  ASSERT_TRUE(at_once.execute(u, 0.1, {}));
+  const auto start = std::chrono::steady_clock::now();
+  ASSERT_TRUE(sut.execute(u, 0.1, {}));
+  EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(50));
+  EXPECT_EQ(execution.state(), other.state());
 }
 
 TEST_F(InProcessWorld, RobotExecutesLikeThePlannersModel) {

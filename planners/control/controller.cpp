@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "physics_pool/objective/scorer.hpp"
+#include "planners/approach/straight_reach.hpp"
 
 namespace jostle::planners {
 namespace {
@@ -275,6 +276,7 @@ Result<Outcome> run_controller(const ControlSetup& setup, const ControlOptions& 
 
 ControlSequence straight_line(const physics_pool::TaskGeometry& geometry, const State& x, int steps,
                               double step_duration) {
+  if (!geometry.planar) return straight_reach(geometry, x, steps, step_duration);
   const Step way = to_pregrasp(geometry, x);
   const double duration = steps * step_duration;
   ControlSequence controls{.nu = geometry.layout.nu};

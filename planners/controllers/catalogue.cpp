@@ -18,6 +18,12 @@ bool grasps_in_the_plane(const Scene& scene) {
   return scene.task.kind == physics_pool::kGrasp.name && planar && planar->rotation >= 0;
 }
 
+// A hand that moves in the plane and turns, or one that an arm holds.
+bool reaches(const Scene& scene) {
+  if (as_planar(scene.robot.model)) return grasps_in_the_plane(scene);
+  return scene.task.kind == physics_pool::kGrasp.name && scene.robot.model.hand;
+}
+
 bool pushes_in_the_plane(const Scene& scene) {
   return scene.task.kind == physics_pool::kPush.name && as_planar(scene.robot.model);
 }
@@ -83,7 +89,8 @@ constexpr ControllerKind robust_kind(const char* name, const char* purpose) {
   return {.name = name,
           .purpose = purpose,
           .parameters = "experiments/robust.yaml",
-          .fits = grasps_in_the_plane,
+          .arm_parameters = "experiments/robust-arm.yaml",
+          .fits = reaches,
           .run = robust<method>,
           .planner = robust_planner<method>,
           .improves_initial = true};
@@ -119,9 +126,9 @@ constexpr ControllerKind kInterleaved =
     robust_kind<interleaved>("ocl", "robust parts open-loop, others closed-loop (Alg. 4)");
 
 std::vector<const ControllerKind*>& catalogue() {
-  static std::vector<const ControllerKind*> kinds{&kOnline,         &kNaive,      &kMpc,        &kOpenLoop,
-                                                  &kRobustOpenLoop, &kConvergent, &kClosedLoop, &kInterleaved,
-                                                  &kTampc,          &kUampc,      &kSlowMpc};
+  static std::vector<const ControllerKind*> kinds{
+      &kOnline,         &kNaive,      &kMpc,   &kInterleaved, &kClosedLoop, &kOpenLoop,
+      &kRobustOpenLoop, &kConvergent, &kTampc, &kUampc,       &kSlowMpc};
   return kinds;
 }
 

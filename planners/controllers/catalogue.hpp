@@ -32,6 +32,8 @@ struct ControllerKind {
   const char* name;        ///< as users type it
   const char* purpose;     ///< one phrase with its source
   const char* parameters;  ///< the parameter file that `jostle run` gives it where the user names none
+  /// What another file changes of them for robots that do not move in the plane; null: nothing.
+  const char* arm_parameters = nullptr;
 
   /// Whether it can do a scene's task with the scene's robot.
   bool (*fits)(const physics_pool::Scene& scene);

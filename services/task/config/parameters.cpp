@@ -175,12 +175,16 @@ Result<Parameters> with_settings(const Parameters& base, const std::vector<std::
   return result;
 }
 
-Result<Parameters> standard_parameters(const planners::ControllerKind& controller) {
-  return load_parameters(common::data_file(controller.parameters));
+Result<Parameters> standard_parameters(const planners::ControllerKind& controller, const physics_pool::Scene* scene) {
+  auto parameters_result = load_parameters(common::data_file(controller.parameters));
+  if (!parameters_result || !controller.arm_parameters || !scene || as_planar(scene->robot.model))
+    return parameters_result;
+  return load_parameters(common::data_file(controller.arm_parameters), *parameters_result);
 }
 
-Result<Parameters> choose_parameters(const planners::ControllerKind& controller, const ParameterOptions& options) {
-  auto parameters_result = standard_parameters(controller);
+Result<Parameters> choose_parameters(const planners::ControllerKind& controller, const ParameterOptions& options,
+                                     const physics_pool::Scene* scene) {
+  auto parameters_result = standard_parameters(controller, scene);
   if (parameters_result && !options.file.empty()) parameters_result = load_parameters(options.file, *parameters_result);
   if (!parameters_result) return parameters_result;
   std::vector<std::string> settings = options.settings;

@@ -35,9 +35,11 @@ Result<Parameters> load_parameters(const std::filesystem::path& file, const Para
 /// Error kInvalidArgument naming the setting, and a key that may be meant.
 Result<Parameters> with_settings(const Parameters& base, const std::vector<std::string>& settings);
 
-/// Returns what a controller runs with where nobody says anything else: its own parameter file.
-/// Errors   those of load_parameters
-Result<Parameters> standard_parameters(const planners::ControllerKind& controller);
+/// Returns what a controller runs with where nobody says anything else: its own parameter file, and what the one for
+/// arms changes of it if the scene has an arm. `scene`: null for a robot that moves in the plane. Errors   those of
+/// load_parameters
+Result<Parameters> standard_parameters(const planners::ControllerKind& controller,
+                                       const physics_pool::Scene* scene = nullptr);
 
 /// What a command line says of parameters: each changes what it names of the one before.
 struct ParameterOptions {
@@ -48,7 +50,8 @@ struct ParameterOptions {
 
 /// Returns the standard parameters with these options.
 /// Errors   those of load_parameters and with_settings
-Result<Parameters> choose_parameters(const planners::ControllerKind& controller, const ParameterOptions& options);
+Result<Parameters> choose_parameters(const planners::ControllerKind& controller, const ParameterOptions& options,
+                                     const physics_pool::Scene* scene = nullptr);
 
 /// Returns all parameters as a file, which parse_parameters reads back bit-equal.
 std::string to_yaml(const Parameters& parameters);

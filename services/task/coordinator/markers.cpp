@@ -89,6 +89,12 @@ MarkerArray scene_markers(const physics_pool::Scene& scene) {
     drawn.frame_locked(true);
     drawn.text(object.name);
     markers.push_back(std::move(drawn));
+    for (const physics_pool::ObjectPart& part : object.parts) {
+      Marker piece = solid("objects", place(), part, part.pose, object.name == scene.task.target ? kTarget : kObject);
+      piece.header().frame_id(object.name);
+      piece.frame_locked(true);
+      markers.push_back(std::move(piece));
+    }
   }
   return array;
 }

@@ -88,13 +88,13 @@ Result<void> complete(const GoalArguments& arguments, RunOptions& options) {
   options.controller = kind->name;
   if (auto ok = Predictor::check(options.predictor, options.planning); !ok)
     return Error{ok.error().code, "--" + ok.error().message};
-  auto standard_result = standard_parameters(*kind);
+  auto standard_result = standard_parameters(*kind, &options.planning);
   if (!standard_result) return standard_result.error();
   options.noise = arguments.noise.value_or(0.0);
   ParameterOptions chosen = arguments.parameters;
   if (arguments.noise)  // before what the user sets: the last setting of a key counts
     chosen.settings.insert(chosen.settings.begin(), fmt::format("adaptive.noise={}", *arguments.noise));
-  auto parameters_result = choose_parameters(*kind, chosen);
+  auto parameters_result = choose_parameters(*kind, chosen, &options.planning);
   if (!parameters_result) return parameters_result.error();
   options.parameters = to_yaml(*parameters_result);
   options.changed = differences(*standard_result, *parameters_result);

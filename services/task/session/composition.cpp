@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "physics_pool/local/simulator.hpp"
+#include "planners/guided/arm_start.hpp"
 #include "planners/guided/guided_start.hpp"
 
 namespace jostle::task {
@@ -57,6 +58,7 @@ Result<planners::Outcome> Composition::perform(robot_bridge::Robot& robot, perce
 
 std::unique_ptr<planners::Planner> Composition::make_planner(const planners::OnProgress& on_progress) const {
   const Parameters& parameters = parts_.parameters;
+  if (parameters.guidance.candidates > 0 && !geometry().planar) return make_arm_planner(on_progress);
   std::unique_ptr<planners::GuidedPlanner> guide;
   if (parameters.guidance.candidates > 0) {
     // Iterations are counted by whoever makes the plan.
@@ -73,6 +75,19 @@ std::unique_ptr<planners::Planner> Composition::make_planner(const planners::OnP
                                         parameters.controller, on_progress);
   if (!guide) return planner;
   return std::make_unique<planners::GuidedStart>(std::move(guide), std::move(planner));
+}
+
+std::unique_ptr<planners::Planner> Composition::make_arm_planner(const planners::OnProgress& on_progress) const {
+  const Parameters& parameters = parts_.parameters;
+  const auto own = [&] {
+    return planners::make_planner(*controller_, *pool_, parts_.belief, geometry(), parameters.planner,
+                                  parameters.controller, on_progress);
+  };
+  auto guided_result =
+      planners::ArmStart::make(*pool_, parts_.belief, geometry(), parameters.planner, parameters.guidance, own());
+  if (guided_result) return std::move(guided_result).value();
+  spdlog::warn("planned without guidance: {}", guided_result.error().message);
+  return own();
 }
 
 // As a planner's rollouts of its first step do.

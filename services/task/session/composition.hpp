@@ -65,6 +65,7 @@ class Composition {
   // 1; or the guided one. A belief that coarse physics cannot show is planned for without guidance, and the log says
   // why.
   std::unique_ptr<planners::Planner> make_planner(const planners::OnProgress& on_progress) const;
+  std::unique_ptr<planners::Planner> make_arm_planner(const planners::OnProgress& on_progress) const;
   Result<State> moved_apart(const State& x) const;
   Result<State> predict(const planners::ActionAhead& action, planners::TimePoint deadline, std::stop_token stop) const;
 

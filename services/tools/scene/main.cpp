@@ -38,6 +38,7 @@ struct Arguments {
   physics_pool::GeneratePushOptions push;
   std::optional<int> objects;  // 15 of Chapter 3, 9 of Chapter 4, 8 of Chapter 5, 3 of Chapter 7
   std::string task = "wide";
+  std::string robot = "ur5_2f85";
   std::string shape = "cylinder";
   std::string input, output = "-";
   std::vector<std::string> inputs;
@@ -52,8 +53,8 @@ Result<void> check_chapter(const Arguments& arguments) {
     const char* option;
     std::vector<int> chapters;  // whose scenes it means something for
   };
-  for (const Own& own :
-       {Own{"--table", {3}}, Own{"--task", {5}}, Own{"--shape", {6, 7}}, Own{"--integrator", {6, 7}}}) {
+  for (const Own& own : {Own{"--table", {3}}, Own{"--robot", {4}}, Own{"--task", {5}}, Own{"--shape", {6, 7}},
+                         Own{"--integrator", {6, 7}}}) {
     if (arguments.generates->count(own.option) == 0 || std::ranges::count(own.chapters, arguments.chapter) > 0)
       continue;
     return invalid(own.option, fmt::format("it for scenes of Chapter {}", arguments.chapter),
@@ -71,7 +72,8 @@ Result<Scene> make_scene(Arguments arguments) {
   if (arguments.chapter == 4) {
     physics_pool::GenerateShelfOptions shelf{.seed = arguments.generate.seed};
     shelf.objects = arguments.objects.value_or(shelf.objects);
-    return physics_pool::generate_chapter4(shelf);
+    return arguments.robot == "ur5_2f85" ? physics_pool::generate_chapter4_arm(shelf)
+                                         : physics_pool::generate_chapter4(shelf);
   }
   if (arguments.chapter == 5) {
     using physics_pool::AdaptiveTask;
@@ -181,6 +183,11 @@ nlohmann::json to_json(const Scene& scene) {
                                    {"x", object.x},
                                    {"y", object.y},
                                    {"yaw", object.yaw}});
+    for (const physics_pool::ObjectPart& part : object.parts) {
+      nlohmann::json piece = size_json(part);
+      piece.update({{"position", part.pose.position}, {"orientation", part.pose.orientation}});
+      json["objects"].back()["parts"].push_back(std::move(piece));
+    }
   }
   auto& robot = json["robot"];
   robot = {
@@ -226,6 +233,8 @@ Result<std::string> show(const Arguments& arguments) {
   for (const SceneObject& object : scene.objects) {
     print("{:16} {:9} {:20} {:>8.3f} {:>9.3f} {:>8.3f} {:>8.3f} {:>8.3f}\n", object.name, word(object.shape),
           size_text(object), object.mass, object.friction, object.x, object.y, object.yaw);
+    for (const physics_pool::ObjectPart& part : object.parts)
+      print("{:16} {:9} {}\n", "", word(part.shape), size_text(part));
   }
   for (const physics_pool::Fixture& fixture : scene.fixtures) {
     print("{:16} {:9} {:20} {:>8} {:>9} {:>8.3f} {:>8.3f}\n", fixture.name, word(fixture.shape), size_text(fixture),
@@ -271,6 +280,9 @@ void add_commands(CLI::App& app, Arguments& arguments, Command& chosen) {
                    "of Chapter 5: wide, a wide table and a large goal region; strip, a thin strip and a small one; "
                    "changing, the one and then the other; l, two strips at a right angle; clutter, a grasp")
       ->check(CLI::IsMember({"wide", "strip", "changing", "l", "clutter"}))
+      ->capture_default_str();
+  generates->add_option("--robot", arguments.robot, "of Chapter 4: ur5_2f85, an arm, or planar_gripper")
+      ->check(CLI::IsMember({"ur5_2f85", "planar_gripper"}))
       ->capture_default_str();
   generates
       ->add_option("--table", arguments.generate.table,

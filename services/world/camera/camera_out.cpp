@@ -74,6 +74,8 @@ perception::View view_of(const Scene& scene, const std::vector<ObjectTag>& tags,
     std::copy_n(q, 3, X_WB.position.begin());
     std::copy_n(q + 3, 4, X_WB.orientation.begin());
     view.solids.push_back(solid_of(scene.objects[i], X_WB, kObjectShade));
+    for (const physics_pool::ObjectPart& part : scene.objects[i].parts)
+      view.solids.push_back(solid_of(part, pose_of(transform(X_WB) * transform(part.pose)), kObjectShade));
     view.stickers.push_back(
         {.id = tags[i].id, .size = tags[i].size, .X_WT = pose_of(transform(X_WB) * transform(tags[i].X_BT))});
   }

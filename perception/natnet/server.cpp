@@ -8,6 +8,7 @@
 #include <boost/asio/ip/multicast.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <cstring>
 #include <map>
@@ -51,9 +52,18 @@ class Server::Impl {
     return {};
   }
 
-  void publish(Frame frame) {
+  void publish(Frame frame, std::chrono::nanoseconds latency) {
     frame.mid_exposure = frame.received = ticks();
-    boost::asio::post(context_, [this, frame = std::move(frame)]() mutable { send(std::move(frame)); });
+    const auto due = Clock::now() + std::chrono::duration_cast<Clock::duration>(latency);
+    boost::asio::post(context_, [this, due, frame = std::move(frame)]() mutable {
+      if (due <= Clock::now()) return send(std::move(frame));
+      auto timer = std::make_unique<boost::asio::steady_timer>(context_, due);
+      boost::asio::steady_timer& waiting = *timer;
+      waiting.async_wait(
+          [this, timer = std::move(timer), frame = std::move(frame)](const boost::system::error_code& error) mutable {
+            if (!error) send(std::move(frame));
+          });
+    });
   }
 
   std::size_t clients() const { return count_; }
@@ -194,7 +204,7 @@ Result<std::unique_ptr<Server>> Server::listen(Options options, std::vector<Mode
 
 Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() = default;
-void Server::publish(Frame frame) { impl_->publish(std::move(frame)); }
+void Server::publish(Frame frame, std::chrono::nanoseconds latency) { impl_->publish(std::move(frame), latency); }
 std::size_t Server::clients() const { return impl_->clients(); }
 
 }  // namespace jostle::perception::natnet

@@ -2,6 +2,7 @@
 /// \file
 /// The server's end of NatNet: a motion capture that is simulated.
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -37,8 +38,9 @@ class Server {
   static Result<std::unique_ptr<Server>> listen(Options options, std::vector<Model> models);
   ~Server();
 
-  /// Sends a frame that was exposed now; its number and ticks are the server's.
-  void publish(Frame frame);
+  /// Sends a frame that was exposed now; its number and ticks are the server's. `latency`: it is sent so much later,
+  /// after those that are sent meanwhile.
+  void publish(Frame frame, std::chrono::nanoseconds latency = {});
   std::size_t clients() const;
 
  private:

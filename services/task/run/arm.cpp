@@ -58,7 +58,10 @@ std::vector<Part> parts_of_world(const RunOptions& options, const std::filesyste
   } else if (options.sensor.kind != Sensor::Kind::kSim) {
     const bool simulated = options.sensor.kind == Sensor::Kind::kMocapSim;
     const std::string host = simulated ? mocap_address(domain) : options.sensor.host;
-    if (simulated) seen_by = {"--mocap", host};
+    if (simulated) {
+      seen_by = world::arguments_of(options.mocap_faults);
+      seen_by.insert(seen_by.end(), {"--mocap", host});
+    }
     // A simulated world has a clock of its own, which the frames tell.
     const char* stamps = options.arm.kind == Arm::Kind::kSim ? "server" : "host";
     parts.push_back(

@@ -90,6 +90,7 @@ int main(int argc, char** argv) {
          "camera-sim, a camera that looks at rendered tags on the objects; mocap:HOST, a motion capture that speaks\n"
          "NatNet (docs/perception.md)")
       ->capture_default_str();
+  world::add_mocap_fault_options(app, options.mocap_faults);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   if (*view && view->results().front().empty()) options.view = kViewPort;
   if (options.pool == "threads" && options.workers == 0) {
@@ -110,11 +111,16 @@ int main(int argc, char** argv) {
                  "--objects: got " + objects + ", wanted sim or mocap-sim: the arm's world is simulated"},
                 common::kExitUsage);
   }
+  if (!options.mocap_faults.are_none() && options.sensor.kind != Sensor::Kind::kMocapSim) {
+    return fail({Code::kInvalidArgument,
+                 fmt::format("--objects: got {} with --mocap-…, wanted mocap-sim: only it has faults", objects)},
+                common::kExitUsage);
+  }
   if (options.sensor.kind == Sensor::Kind::kCameraSim && options.arm.kind == Arm::Kind::kUr) {
-    return fail(
-        {Code::kInvalidArgument, "--objects: got camera-sim with --arm " + arm +
-                                     ", wanted --arm sim or ur-sim: only the world of a simulated arm is rendered"},
-        common::kExitUsage);
+    return fail({Code::kInvalidArgument, fmt::format("--objects: got camera-sim with --arm {}, wanted --arm sim or "
+                                                     "ur-sim: only the world of a simulated arm is rendered",
+                                                     arm)},
+                common::kExitUsage);
   }
   if (options.sensor.kind == Sensor::Kind::kCameraSim && arguments.level != "none") {
     return fail({Code::kInvalidArgument, "--uncertainty: got " + arguments.level +

@@ -13,6 +13,7 @@
 #include "physics_pool/uncertainty/levels.hpp"
 #include "services/task/config/parameter_keys.hpp"
 #include "services/task/run/arm.hpp"
+#include "services/world/link/mocap_faults.hpp"
 
 namespace CLI {
 class App;
@@ -34,9 +35,10 @@ struct RunOptions {
   std::uint64_t seed = 1;
   /// b of Eq. 5.10: slope of the simulated world's noise over the speed, beside that of `level`.
   double noise = 0.0;
-  double rate = 0.0;  ///< of the simulated world; 0: as fast as possible
-  Arm arm;            ///< what moves
-  Sensor sensor;      ///< who sees the objects
+  double rate = 0.0;                      ///< of the simulated world; 0: as fast as possible
+  Arm arm;                                ///< what moves
+  Sensor sensor;                          ///< who sees the objects
+  world::MocapFaultOptions mocap_faults;  ///< of a motion capture that is simulated
   bool plan_only = false;
   bool headless = false;  ///< plain lines instead of a live display
   std::optional<int> domain;

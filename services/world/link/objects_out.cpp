@@ -31,7 +31,8 @@ void ObjectTopics::tell(const std::vector<perception::ObjectReading>& objects, d
   (void)transforms_.write(transform_message(message));
 }
 
-Result<std::unique_ptr<MocapCameras>> MocapCameras::start(const std::string& address, const StateLayout& layout) {
+Result<std::unique_ptr<MocapCameras>> MocapCameras::start(const std::string& address, const StateLayout& layout,
+                                                          const MocapFaultOptions& faults) {
   std::vector<natnet::Model> models;
   std::vector<std::string> names;
   for (const ObjectSlot& object : layout.objects) {
@@ -40,7 +41,7 @@ Result<std::unique_ptr<MocapCameras>> MocapCameras::start(const std::string& add
   }
   auto server_result = natnet::Server::listen({.address = address}, std::move(models));
   if (!server_result) return server_result.error();
-  return std::unique_ptr<MocapCameras>(new MocapCameras(std::move(server_result).value(), std::move(names)));
+  return std::unique_ptr<MocapCameras>(new MocapCameras(std::move(server_result).value(), std::move(names), faults));
 }
 
 void MocapCameras::tell(const std::vector<perception::ObjectReading>& objects, double time) {
@@ -54,7 +55,9 @@ void MocapCameras::tell(const std::vector<perception::ObjectReading>& objects, d
                            [](double value) { return static_cast<float>(value); });
     frame.bodies.push_back(body);
   }
-  server_->publish(std::move(frame));
+  faults_.spoil(frame);
+  const std::chrono::duration<double> latency(faults_.latency());
+  server_->publish(std::move(frame), std::chrono::duration_cast<std::chrono::nanoseconds>(latency));
 }
 
 }  // namespace jostle::world

@@ -13,6 +13,7 @@
 #include "services/wire/dds/participant.hpp"
 #include "services/wire/dds/topics.hpp"
 #include "services/wire/dds/writer.hpp"
+#include "services/world/link/mocap_faults.hpp"
 #include "services/world/link/robot_out.hpp"
 
 namespace jostle::world {
@@ -43,21 +44,24 @@ class ObjectTopics final : public ObjectsOut {
   wire::Writer<tf2_msgs::msg::TFMessage> transforms_;
 };
 
-/// Cameras of a simulated motion capture: each object is a rigid body of its name, seen without error, and `jostle
-/// perceive mocap` reads them. The frames' timestamps are the times that tell() is given.
+/// Cameras of a simulated motion capture: each object is a rigid body of its name, seen with the faults that were
+/// ordered, and `jostle perceive mocap` reads them. The frames' timestamps are the times that tell() is given.
 class MocapCameras final : public ObjectsOut {
  public:
   /// `address`: IPv4 of this host, on whose NatNet ports they serve. `layout`: has the objects.
   /// Error kUnavailable: the port is taken.
-  static Result<std::unique_ptr<MocapCameras>> start(const std::string& address, const StateLayout& layout);
+  static Result<std::unique_ptr<MocapCameras>> start(const std::string& address, const StateLayout& layout,
+                                                     const MocapFaultOptions& faults);
   void tell(const std::vector<perception::ObjectReading>& objects, double time) override;
 
  private:
-  MocapCameras(std::unique_ptr<perception::natnet::Server> server, std::vector<std::string> names)
-      : server_(std::move(server)), names_(std::move(names)) {}
+  MocapCameras(std::unique_ptr<perception::natnet::Server> server, std::vector<std::string> names,
+               const MocapFaultOptions& faults)
+      : server_(std::move(server)), names_(std::move(names)), faults_(faults) {}
 
   std::unique_ptr<perception::natnet::Server> server_;
   const std::vector<std::string> names_;  // the id of a body is its place here, from 1
+  MocapFaults faults_;
 };
 
 }  // namespace jostle::world

@@ -15,6 +15,7 @@ using perception::Estimate;
 
 constexpr auto kUnseen = std::chrono::seconds(1);                // worth a word
 constexpr auto kStandardForms = std::chrono::milliseconds(100);  // between two messages of them
+constexpr auto kFirstLook = std::chrono::seconds(3);             // for objects that are hidden for a moment
 constexpr double kStartedAgain = 5.0;                            // s; no measurement is so late
 
 }  // namespace
@@ -54,6 +55,8 @@ void Sight::look(double time, const std::vector<perception::Sighting>& seen) {
   if (time < newest_ - kStartedAgain) {
     spdlog::warn("time went back from {:.3f} to {:.3f} s: began anew", newest_, time);
     estimator_ = perception::Estimator();
+    complete_ = false;
+    first_.reset();
     newest_ = time;
   }
   newest_ = std::max(newest_, time);
@@ -72,8 +75,18 @@ void Sight::look(double time, const std::vector<perception::Sighting>& seen) {
   tell(estimates);
 }
 
+bool Sight::is_complete(const std::vector<Estimate>& estimates) {
+  if (!scene_ || complete_) return true;
+  const auto is_known = [&](const physics_pool::SceneObject& object) {
+    return std::ranges::any_of(estimates, [&](const Estimate& e) { return e.reading.name == object.name; });
+  };
+  if (!first_) first_ = Clock::now();
+  complete_ = std::ranges::all_of(scene_->objects, is_known) || Clock::now() - *first_ > kFirstLook;
+  return complete_;
+}
+
 void Sight::tell(const std::vector<Estimate>& estimates) {
-  if (estimates.empty()) return;
+  if (estimates.empty() || !is_complete(estimates)) return;
   std::vector<perception::ObjectReading> readings;
   for (const Estimate& estimate : estimates) readings.push_back(estimate.reading);
   topics_.tell(readings, newest_);

@@ -22,7 +22,7 @@ namespace jostle::world {
 
 /// Publishes one estimate of every object. Where the scene is known, it is the nearest one that physics can start from:
 /// what may well stand stands, and nothing is inside anything else. One that cannot be made so is not published; the
-/// log says which objects are to blame.
+/// log says which objects are to blame. At first, three seconds are waited for objects that nobody has seen yet.
 ///
 /// Threads  look() on one, everything else on any.
 class Sight {
@@ -46,6 +46,8 @@ class Sight {
 
   void tell(const std::vector<perception::Estimate>& estimates);
   bool make_feasible(std::vector<perception::Estimate>& estimates);
+  // Whether all of the scene's objects were seen, or enough time has passed.
+  bool is_complete(const std::vector<perception::Estimate>& estimates);
 
   const std::optional<physics_pool::Scene> scene_;
   ObjectTopics topics_;
@@ -53,6 +55,8 @@ class Sight {
   Clock::time_point next_detections_{};
   perception::Estimator estimator_;
   double newest_ = 0.0;  // s
+  bool complete_ = false;
+  std::optional<Clock::time_point> first_;  // estimate of anything
   common::Trouble bad_{"bad sightings"}, infeasible_{"estimates that cannot be"};
   mutable std::mutex mutex_;  // guards what follows
   std::map<std::string, Clock::time_point> seen_;

@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   std::string scene_file, belief_file, level = "none", mocap;
   bool has_camera = false;
   std::uint64_t seed = 0;
+  MocapFaultOptions faults;
   SimulatedWorldOptions options;
   wire::ParticipantOptions participant_options{
       .name = "jostle_sim", .role = wire::Role::kRobot, .waits_for_server = true};
@@ -51,6 +52,7 @@ int main(int argc, char** argv) {
                  "IPv4 address at which a simulated motion capture sees the objects (NatNet; `jostle perceive mocap`\n"
                  "reads it); they are not published then (default: none)")
       ->excludes(camera_option);
+  add_mocap_fault_options(app, faults);
   common::add_process_options(app, process);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   common::die_with_parent(process.parent);
@@ -95,7 +97,7 @@ int main(int argc, char** argv) {
     } else if (mocap.empty()) {
       objects = std::make_unique<ObjectTopics>(*participant_result);
     } else {
-      auto cameras_result = MocapCameras::start(mocap, physics_pool::layout_of(*scene_result));
+      auto cameras_result = MocapCameras::start(mocap, physics_pool::layout_of(*scene_result), faults);
       if (!cameras_result) return fail(cameras_result.error());
       objects = std::move(cameras_result).value();
     }

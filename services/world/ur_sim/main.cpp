@@ -59,6 +59,7 @@ class Eyes {
 struct Options {
   std::string scene_file, address = "127.0.0.1", generation = "cb3", mocap;
   bool has_eyes = true, has_camera = false;
+  MocapFaultOptions faults;
   std::uint16_t pendant = 0;  // port; 0: none
 };
 
@@ -182,6 +183,7 @@ int main(int argc, char** argv) {
          "publishing where the objects are")
       ->excludes(no_eyes)
       ->excludes(mocap);
+  add_mocap_fault_options(app, options.faults);
   common::add_process_options(app, process);
   app.footer(
       "Ports: 29999 dashboard, 30001 primary, 30002 secondary, 30004 RTDE, 63352 gripper.\n"
@@ -210,7 +212,7 @@ int main(int argc, char** argv) {
     std::optional<wire::Participant> participant;
     std::unique_ptr<ObjectsOut> objects;
     if (!options.mocap.empty()) {
-      auto cameras_result = MocapCameras::start(options.mocap, machine.layout());
+      auto cameras_result = MocapCameras::start(options.mocap, machine.layout(), options.faults);
       if (!cameras_result) return fail(cameras_result.error());
       objects = std::move(cameras_result).value();
     } else if (options.has_eyes) {

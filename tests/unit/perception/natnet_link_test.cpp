@@ -124,6 +124,24 @@ TEST_F(NatNetLink, ExposureIsOfThisHostsClock) {
   EXPECT_LE(eyes.newest()->exposed, after + error);
 }
 
+// However late a frame comes, it says when it was exposed.
+TEST_F(NatNetLink, LateFramesComeLateWithTheTimeOfTheirExposure) {
+  const auto server = serve({4, 1});
+  look_for_it();
+  ASSERT_TRUE(soon(kPatience, [&] {
+    server->publish({.bodies = {{.id = 3}}});
+    return eyes.count() > 0;
+  }));
+  using Clock = std::chrono::system_clock;
+  Frame marked{.bodies = {{.id = 3, .position = {9, 9, 9}}}};
+  const auto began = Clock::now();
+  server->publish(marked, 500ms);
+  ASSERT_TRUE(soon(kPatience,
+                   [&] { return !eyes.newest()->bodies.empty() && eyes.newest()->bodies[0].body.position[0] == 9; }));
+  EXPECT_GE(Clock::now() - began, 500ms);
+  EXPECT_LT(eyes.newest()->exposed - began, 250ms);
+}
+
 TEST_F(NatNetLink, ByMulticastComesToWhoListens) {
   const auto server = serve({4, 1}, true);
   look_for_it({.interface = address});

@@ -57,6 +57,12 @@ Result<void> measure_round_trip(const Settings& settings);
 /// Measures a batch with stop_losers against the same batch without, rollouts/s.
 Result<void> measure_early_stop(const Settings& settings);
 
+/// Measures an iteration of RobustSTO (Alg. 5), all of whose rollouts are under way at once on threads that wait
+/// instead of simulating, against one such rollout (Eq. 4.43), ms: the thesis's 84 rollouts with a thread for each, and
+/// with 64 threads, and 60 rollouts (N_c = 2, N_w = 6) with 64. Then the same with physics on all cores, against an
+/// iteration by J alone.
+Result<void> measure_robust_iteration(const Settings& settings);
+
 /// Measures worker processes that wait instead of simulating: the time their waiting
 /// takes when nobody idles, against the time the batch took.
 Result<void> measure_scheduling(const Settings& settings);

@@ -15,6 +15,7 @@
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/results/results.hpp"
+#include "services/studies/bench/arm_reaches.hpp"
 #include "services/studies/bench/benchmarks.hpp"
 #include "services/studies/bench/chaos.hpp"
 #include "services/studies/bench/cheap_physics.hpp"
@@ -457,6 +458,44 @@ class Tags final : public Benchmark {
   TagsOptions options_;
 };
 
+class ArmReachesBenchmark final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--reaches", options_.reaches, "Reaches of each kind")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1'000'000));
+    app.add_option("--speeds", options_.speeds, "Speeds of the hand, m/s")
+        ->capture_default_str()
+        ->delimiter(',')
+        ->check(CLI::Range(0.05, 5.0));
+    app.add_option("--time-steps", options_.time_steps, "Steps of the engine, s")
+        ->capture_default_str()
+        ->delimiter(',')
+        ->check(CLI::Range(2e-4, 4e-3));
+    app.add_option("--contact-times", options_.contact_times,
+                   "Times in which bodies in contact part, s; at least 2 steps")
+        ->capture_default_str()
+        ->delimiter(',')
+        ->check(CLI::Range(4e-4, 0.1));
+    common::add_seed_option(app, "--seed", options_.seed, "Of the first shelf; 10 reaches in each");
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_arm_reaches(options_));
+  }
+
+  const char* unit() const override { return "reaches"; }
+
+ private:
+  ArmReachesOptions options_;
+};
+
 class EstimatorBenchmark final : public Benchmark {
  public:
   using Benchmark::Benchmark;
@@ -510,6 +549,9 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
   constexpr std::type_identity<RatioOfWorkers> of_workers;
   add(ratio, "arm-cycle", "our client of an arm's controller against a bare loop: from sample to command", "2 min",
       kDomain, 5, measure_arm_cycle);
+  add(std::type_identity<ArmReachesBenchmark>(), "arm-reaches",
+      "fast random reaches of an arm into shelves: what diverges, what is inside what, which torques it takes",
+      "10 min", kNothing);
   add(ratio, "bag", "messages into a bag against bare appends of the same bytes", "15 s", kNothing, 7, measure_bag);
   add(std::type_identity<Chaos>(), "chaos",
       "plans while workers are killed, stalled and unplugged: all bit-equal, and how slow", "2 min", kDomain);
@@ -547,6 +589,8 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
       measure_pool_threads);
   add(std::type_identity<Record>(), "record", "the recorder at 20,000 messages per second, or what it costs a plan",
       "75 s", kDomain);
+  add(ratio, "robust-iteration", "an iteration of RobustSTO on waiting threads against one rollout (Eq. 4.43)", "2 min",
+      kNothing, 7, measure_robust_iteration);
   add(ratio, "round-trip", "an empty assignment through the pool against a bare Fast DDS echo", "2 s", kDomain, 25,
       measure_round_trip);
   add(of_workers, "scheduling", "waiting workers against workers that never idle", "30 s", kDomain, 5,

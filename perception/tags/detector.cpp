@@ -54,6 +54,9 @@ Detector& Detector::operator=(Detector&&) noexcept = default;
 Detector::~Detector() = default;
 
 std::vector<Detection> Detector::detect(const GreyImage& image) {
+  // One pixel for each cell of a tag is too little in any case, and libapriltag 3.3 crashes in images of one tile.
+  const double least = kTagCells * static_cast<double>(parts_->detector->quad_decimate);
+  if (image.width < least || image.height < least) return {};
   // It is not written to: only a blur that nobody asks for would do that.
   image_u8_t view{.width = image.width,
                   .height = image.height,

@@ -153,6 +153,12 @@ Fit fit_of(const Minimum& minimum, std::size_t corners) {
 
 }  // namespace
 
+double surprise_of(const Fit& fit, const PoseEstimate& estimate) {
+  constexpr double kCorners = 4;
+  const double sigma = std::max(kCornerSigma, estimate.best.error_px);
+  return kCorners * (std::pow(fit.error_px, 2) - std::pow(estimate.best.error_px, 2)) / (sigma * sigma);
+}
+
 std::array<std::array<double, 3>, 4> tag_corners(double size) {
   const double half = size / 2;
   return {{{-half, -half, 0}, {half, -half, 0}, {half, half, 0}, {-half, half, 0}}};

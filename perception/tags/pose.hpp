@@ -50,6 +50,10 @@ inline constexpr double kCornerSigma = 0.06;
 Result<PoseEstimate> estimate_pose(const Camera& camera, std::span<const TagView> tags,
                                    double corner_sigma = kCornerSigma);
 
+/// Returns how much worse a minimum of one tag explains the corners than the best one: -2 times the logarithm of the
+/// ratio of likelihoods, with corners at least as noisy as the best fit's.
+double surprise_of(const Fit& fit, const PoseEstimate& estimate);
+
 /// Returns where the four corners of a tag are in its frame, m, in the order of TagView::corners.
 std::array<std::array<double, 3>, 4> tag_corners(double size);
 

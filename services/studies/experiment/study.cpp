@@ -9,6 +9,7 @@
 
 #include "services/common/process/files.hpp"
 #include "services/studies/experiment/adaptive_study.hpp"
+#include "services/studies/experiment/eyes_study.hpp"
 #include "services/studies/experiment/grasping_study.hpp"
 #include "services/studies/experiment/prediction_study.hpp"
 #include "services/studies/experiment/push_study.hpp"
@@ -41,6 +42,7 @@ Result<std::unique_ptr<Study>> load_study(const std::string& name) {
     auto read = &read_grasping_study;
     fields.choice<decltype(read)>("study", read,
                                   {{"adaptive", &read_adaptive_study},
+                                   {"eyes", &read_eyes_study},
                                    {"grasping", &read_grasping_study},
                                    {"prediction", &read_prediction_study},
                                    {"push", &read_push_study},

@@ -43,17 +43,14 @@ std::array<double, 36> turned(const std::array<double, 36>& covariance, const Ei
 
 // What a tag says of its object. Of two minima the likelier one explains the corners better, and stands.
 perception::Sighting sighting(const ObjectTag& tag, const perception::PoseEstimate& estimate, const Isometry3d& X_WC) {
-  constexpr double kCoordinates = 8;  // of the corners
-  const double sigma = std::max(perception::kCornerSigma, estimate.best.error_px);
   perception::Sighting sighting{tag.object, {}};
   const auto add = [&](const perception::Fit& fit) {
     const Isometry3d X_WB = X_WC * transform(fit.X_CB);
     const double tilt = std::acos(std::clamp(X_WB.linear()(2, 2), -1.0, 1.0));
-    const double worse = (std::pow(fit.error_px, 2) - std::pow(estimate.best.error_px, 2)) / (sigma * sigma);
     sighting.explanations.push_back(
         {.X_WB = pose_of(X_WB),
          .covariance = turned(estimate.covariance, X_WC.linear()),
-         .surprise = kCoordinates * worse + std::min(std::pow(tilt / kDoubtfulTilt, 2), kMostDoubt)});
+         .surprise = surprise_of(fit, estimate) + std::min(std::pow(tilt / kDoubtfulTilt, 2), kMostDoubt)});
   };
   add(estimate.best);
   if (estimate.other) add(*estimate.other);

@@ -92,7 +92,7 @@ TEST_F(RecordedRuns, ThatPlannedWhileActingDecideTheSameOnThreadsOnWorkersAndAga
   const auto scene = folder.write("strip.yaml", physics_pool::to_yaml(*scene_result));
   const auto parameters = folder.write("few.yaml",
                                        "control: {plan_while_acting: 0.01}\n"
-                                       "adaptive: {sequences: 3, samples: 4, max_actions: 5}\n"
+                                       "adaptive: {sequences: 3, least_actions: 4, samples: 4, max_actions: 5}\n"
                                        "objective: {success_cost: 0}\n");
   std::vector<json> reports;
   for (const char* pool : {"threads", "dds"}) {

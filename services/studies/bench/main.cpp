@@ -23,6 +23,7 @@
 #include "services/studies/bench/estimator.hpp"
 #include "services/studies/bench/first_plan.hpp"
 #include "services/studies/bench/fleet_curve.hpp"
+#include "services/studies/bench/idle.hpp"
 #include "services/studies/bench/pool_timeline.hpp"
 #include "services/studies/bench/record.hpp"
 #include "services/studies/bench/tags.hpp"
@@ -270,6 +271,45 @@ class FirstPlan final : public Benchmark {
 
  private:
   FirstPlanOptions options_;
+};
+
+class Idle final : public Benchmark {
+ public:
+  using Benchmark::Benchmark;
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--rows", options_.rows, "Only these, such as tampc-strip,mpc")
+        ->delimiter(',')
+        ->check(CLI::IsMember(idle_rows()));
+    app.add_option("--worlds", options_.worlds, "Worlds of each row, and one run of each side in each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    common::add_seed_option(app, "--seed", options_.first_seed, "Seed of the first world; the next ones follow");
+    app.add_option("--nearness", options_.nearness, "control.plan_while_acting of the side that has it, m")
+        ->capture_default_str()
+        ->check(CLI::Range(1e-9, 1e3));
+    app.add_option("--noise", options_.noise, "Slope b of the noise in the worlds of Ch. 5")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1.0));
+    app.add_option("--rate", options_.rate, "World seconds per second while acting")
+        ->capture_default_str()
+        ->check(CLI::Range(0.01, 1e3));
+    app.add_option("--workers", options_.workers, "Threads of the pool")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--timeout", options_.timeout, "Seconds of one run")
+        ->capture_default_str()
+        ->check(CLI::Range(1.0, 1e6));
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.line = start.line;
+    return exit_code(bench_idle(options_, json, start.stop));
+  }
+
+ private:
+  IdleOptions options_;
 };
 
 class CoarseGrasp final : public Benchmark {
@@ -574,6 +614,9 @@ std::vector<std::unique_ptr<Benchmark>> all_benchmarks() {
       9, measure_hosts);
   add(of_workers, "hosts-scheduling", "waiting workers on several hosts against workers that never idle", "1 min",
       kDomain, 5, measure_hosts_scheduling);
+  add(std::type_identity<Idle>(), "idle",
+      "how long robots stand still before their actions, with plans made meanwhile and while they act", "an hour",
+      kNothing);
   add(std::type_identity<RatioOfLanes>(), "lanes",
       "waiting threads of one worker per host against threads that never idle", "1 min", kDomain, 5, measure_lanes);
   add(ratio, "parareal", "Parareal on all processors against what Eq. 6.4 allows", "15 s", kNothing, 15,

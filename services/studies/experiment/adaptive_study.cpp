@@ -1,13 +1,12 @@
 #include "services/studies/experiment/adaptive_study.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <optional>
 
 #include "physics_pool/local/execution_world.hpp"
@@ -26,6 +25,26 @@ namespace {
 
 using nlohmann::json;
 using planners::Ending;
+
+// "tampc", or "tampc:0.075": a controller, and the b that its planner believes in, whatever the world's.
+struct Method {
+  std::string controller;
+  std::optional<double> believed;
+};
+
+Result<Method> parse_method(const std::string& text, const std::string& where) {
+  const auto colon = text.find(':');
+  Method method{.controller = text.substr(0, colon)};
+  if (auto ok = check_methods({method.controller}, where); !ok) return ok.error();
+  if (colon == text.npos) return method;
+  const std::string number = text.substr(colon + 1);
+  double believed = 0.0;
+  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), believed);
+  if (error != std::errc() || end != number.data() + number.size() || !(believed >= 0 && believed <= 1))
+    return invalid(where, "'" + text + "'", "a number from 0 to 1 after the colon, such as tampc:0.075");
+  method.believed = believed;
+  return method;
+}
 
 // One scene, one method, one level.
 struct Case {
@@ -83,11 +102,13 @@ Result<json> perform(const AdaptiveStudy& study, const Case& one, std::optional<
   if (!truth_result) return truth_result.error();
   physics_pool::ThreadPool pool(1);
   task::Parameters parameters = study.parameters;
-  parameters.controller.adaptive.noise = believed.value_or(one.level);
+  const auto method_result = parse_method(one.method, "method");
+  if (!method_result) return method_result.error();
+  parameters.controller.adaptive.noise = method_result->believed.value_or(believed.value_or(one.level));
   auto run_result = task::Composition::make({.belief = *scene_result,
                                              .belief_is_exact = true,
                                              .parameters = std::move(parameters),
-                                             .controller = one.method,
+                                             .controller = method_result->controller,
                                              .seed = one.seed},
                                             pool);
   if (!run_result) return run_result.error();
@@ -107,21 +128,8 @@ Result<json> perform(const AdaptiveStudy& study, const Case& one, std::optional<
 double rollouts(const json& run) { return run["rollouts"]; }
 
 // Runs of one task at one level with one method.
-struct Cell {
+struct Cell : RunGroup {
   Case what;
-  int successes = 0, broken = 0;
-  std::vector<const json*> runs;  // that came to an end, whatever it was; broken ones did not
-
-  void add(const json& run) {
-    if (ended_as(run, Ending::kBroken)) {
-      ++broken;
-      return;
-    }
-    runs.push_back(&run);
-    successes += run["success"] ? 1 : 0;
-  }
-
-  common::Share share() const { return common::wilson_interval(successes, static_cast<int>(runs.size())); }
 };
 
 class AdaptiveStudyRunner final : public Study {
@@ -133,9 +141,9 @@ class AdaptiveStudyRunner final : public Study {
     app.add_option("--tasks", study_.tasks, "Only these, such as wide,strip")
         ->delimiter(',')
         ->check(CLI::IsMember({"wide", "strip", "changing", "l", "clutter"}));
-    app.add_option("--methods", study_.methods, "Only these, such as tampc,uampc")
-        ->delimiter(',')
-        ->check(CLI::IsMember({"tampc", "uampc", "slow-mpc"}));
+    app.add_option("--methods", study_.methods,
+                   "Only these, such as tampc,uampc; tampc:0.075 has a planner that believes in b = 0.075")
+        ->delimiter(',');
     app.add_option("--levels", study_.levels, "Slopes b of the noise (Eq. 5.10), such as 0,0.1")
         ->delimiter(',')
         ->check(CLI::Range(0.0, 1.0));
@@ -149,6 +157,9 @@ class AdaptiveStudyRunner final : public Study {
 
   Result<std::vector<std::string>> prepare() override {
     if (auto ok = seeds_.apply(study_.first_seed, study_.last_seed); !ok) return ok.error();
+    for (const std::string& method : study_.methods) {
+      if (auto ok = parse_method(method, "--methods"); !ok) return ok.error();
+    }
     auto parameters_result = task::with_settings(study_.parameters, changes_);
     if (!parameters_result) return parameters_result.error();
     study_.parameters = std::move(parameters_result).value();
@@ -216,7 +227,7 @@ class AdaptiveStudyRunner final : public Study {
     for (const std::string& task : study_.tasks) {
       for (const double level : study_.levels) {
         for (const std::string& method : study_.methods) {
-          result.push_back({.what = {.task = task, .method = method, .level = level}});
+          result.emplace_back().what = {.task = task, .method = method, .level = level};
           for (const json& run : runs) {
             if (run["task"] == task && run["level"] == level && run["method"] == method) result.back().add(run);
           }
@@ -260,15 +271,11 @@ class AdaptiveStudyRunner final : public Study {
   }
 
   json row_of(const Cell& cell) const {
-    const common::Share share = cell.share();
     json row{{"task", cell.what.task},
              {"level", cell.what.level},
              {"method", cell.what.method},
-             {"successes", share.successes},
-             {"runs", share.runs},
-             {"broken", cell.broken},
-             {"interval", {common::number_or_null(share.low), common::number_or_null(share.high)}},
              {"thesis", thesis_of(cell.what)}};
+    put_share(row, cell);
     const std::pair<const char*, common::Mean> means[] = {{"actions", mean_over(cell.runs, actions)},
                                                           {"rollouts", mean_over(cell.runs, rollouts)},
                                                           {"planning_seconds", mean_over(cell.runs, planning)},
@@ -339,10 +346,8 @@ Result<void> check(const AdaptiveStudy& study, const std::string& origin) {
     if (!physics_pool::parse_adaptive_task(task))
       return invalid(origin + ": tasks", "'" + task + "'", "wide, strip, changing, l or clutter");
   }
-  const std::vector<std::string> known = planners::controller_names();
   for (const std::string& method : study.methods) {
-    if (std::ranges::find(known, method) == known.end())
-      return invalid(origin + ": methods", "'" + method + "'", fmt::format("{}", fmt::join(known, ", ")));
+    if (auto ok = parse_method(method, origin + ": methods"); !ok) return ok.error();
   }
   for (const double level : study.levels) {
     if (!(level >= 0 && level <= 1)) return invalid(origin + ": levels", fmt::format("{}", level), "0 to 1");
@@ -361,15 +366,12 @@ Result<std::unique_ptr<Study>> read_adaptive_study(yaml::Fields& fields, const s
   fields.required("tasks", study.tasks);
   fields.required("methods", study.methods);
   fields.required("levels", study.levels);
-  fields.section("seeds", true, [&](yaml::Fields& seeds) {
-    seeds.required("first", study.first_seed);
-    seeds.required("last", study.last_seed);
-  });
+  read_seeds(fields, study.first_seed, study.last_seed);
   fields.choice<bool>("figure", study.shows_ways, {{"success", false}, {"ways", true}});
   fields.optional("thesis", study.thesis);
   fields.optional("remark", study.remark);
   if (auto ok = check(study, origin); !ok) return ok.error();
-  auto parameters_result = task::load_parameters(std::filesystem::path(origin).parent_path() / parameters);
+  auto parameters_result = parameters_beside(origin, parameters);
   if (!parameters_result) return parameters_result.error();
   study.parameters = *parameters_result;
   // No clock decides: actions and rollouts are what is limited.

@@ -18,9 +18,11 @@ namespace jostle::studies {
 struct AdaptiveStudy {
   StudyAbout about;
   task::Parameters parameters;
-  std::vector<std::string> tasks;    ///< those of generate_chapter5
-  std::vector<std::string> methods;  ///< names of controllers
-  std::vector<double> levels;        ///< b of Eq. 5.10, of the world and as the planner knows it
+  std::vector<std::string> tasks;  ///< those of generate_chapter5
+  /// Names of controllers. After a colon may stand the b that a controller's planner believes in, such as
+  /// "tampc:0.075"; otherwise it knows the world's.
+  std::vector<std::string> methods;
+  std::vector<double> levels;  ///< b of Eq. 5.10, of the world
   std::uint64_t first_seed = 1001, last_seed = 1050;
   bool shows_ways = false;  ///< the figure is the speed along the way (Fig. 5.4), not success and time (Fig. 5.3)
   /// By task and method: what the thesis says, in its words or numbers.

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <optional>
 
 #include "physics_pool/local/thread_pool.hpp"
@@ -34,10 +33,7 @@ GraspingStudy read(yaml::Fields& fields, std::string& parameters) {
   GraspingStudy study{.about = read_about(fields)};
   fields.required("parameters", parameters);
   fields.optional("objects", study.objects);
-  fields.section("seeds", true, [&](yaml::Fields& seeds) {
-    seeds.required("first", study.first_seed);
-    seeds.required("last", study.last_seed);
-  });
+  read_seeds(fields, study.first_seed, study.last_seed);
   fields.optional("levels", study.levels);
   fields.optional("controllers", study.controllers);
   fields.optional("thesis", study.thesis);
@@ -153,11 +149,7 @@ struct Cell {
 
   common::Share share() const { return common::wilson_interval(static_cast<int>(successes.size()), runs); }
 
-  common::Mean over_successes(const char* key) const {
-    std::vector<double> values;
-    for (const json* run : successes) values.push_back((*run)[key]);
-    return common::mean_of(values);
-  }
+  common::Mean over_successes(const char* key) const { return mean_over(successes, key); }
 };
 
 // Levels and controllers that exist; `where` they were asked for.
@@ -293,9 +285,7 @@ class GraspingStudyRunner final : public Study {
                {"broken", cell.broken},
                {"interval", {common::number_or_null(share.low), common::number_or_null(share.high)}}};
       for (const char* key : {"replans", "execution_cost", "plan_seconds", "execution_seconds", "total_seconds"}) {
-        const common::Mean mean = cell.over_successes(key);
-        row[key] = common::number_or_null(mean.value);
-        row[std::string(key) + "_half_width"] = common::number_or_null(mean.half_width);
+        put_mean(row, key, cell.over_successes(key));
       }
       result["rows"].push_back(std::move(row));
     }
@@ -314,7 +304,7 @@ class GraspingStudyRunner final : public Study {
 Result<std::unique_ptr<Study>> read_grasping_study(yaml::Fields& fields, const std::string& origin) {
   std::string parameters;
   GraspingStudy study = read(fields, parameters);
-  auto parameters_result = task::load_parameters(std::filesystem::path(origin).parent_path() / parameters);
+  auto parameters_result = parameters_beside(origin, parameters);
   if (!parameters_result) return parameters_result.error();
   study.parameters = *parameters_result;
   if (auto ok = check(study, origin + ": "); !ok) return ok.error();

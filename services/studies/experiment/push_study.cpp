@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <optional>
 
 #include "physics_pool/local/thread_pool.hpp"
@@ -84,27 +83,20 @@ json record_of(const Case& one, const std::string& error) {
 }
 
 // Runs with one predictor.
-struct Cell {
+struct Cell : RunGroup {
   PushStudy::Entry entry;
-  int successes = 0, timed_out = 0, broken = 0;
-  std::vector<const json*> runs;     // that came to an end, whatever it was; broken ones did not
-  std::vector<const json*> in_time;  // of these: not ended by the clock
+  int timed_out = 0;
+  std::vector<const json*> in_time;  // of its runs: not ended by the clock
 
   void add(const json& run) {
-    if (ended_as(run, Ending::kBroken)) {
-      ++broken;
-      return;
-    }
-    runs.push_back(&run);
-    successes += run["success"] ? 1 : 0;
+    RunGroup::add(run);
     if (ended_as(run, Ending::kTimedOut))
       ++timed_out;
-    else
+    else if (!ended_as(run, Ending::kBroken))
       in_time.push_back(&run);
   }
 
   std::string name() const { return fmt::format("{} x{}", entry.predictor, entry.threads); }
-  common::Share share() const { return common::wilson_interval(successes, static_cast<int>(runs.size())); }
 };
 
 double per_plan(const json& run) { return planning(run) / (run["replans"].get<double>() + 1); }
@@ -112,7 +104,7 @@ double per_plan(const json& run) { return planning(run) / (run["replans"].get<do
 std::vector<Cell> cells(const std::vector<PushStudy::Entry>& entries, const json& runs) {
   std::vector<Cell> result;
   for (const PushStudy::Entry& entry : entries) {
-    result.push_back({.entry = entry});
+    result.emplace_back().entry = entry;
     for (const json& run : runs) {
       if (run["predictor"] == entry.predictor && run["threads"] == entry.threads) result.back().add(run);
     }
@@ -218,14 +210,8 @@ class PushStudyRunner final : public Study {
   }
 
   json row_of(const Cell& cell) const {
-    const common::Share share = cell.share();
-    json row{{"predictor", cell.entry.predictor},
-             {"threads", cell.entry.threads},
-             {"successes", share.successes},
-             {"runs", share.runs},
-             {"timed_out", cell.timed_out},
-             {"broken", cell.broken},
-             {"interval", {common::number_or_null(share.low), common::number_or_null(share.high)}}};
+    json row{{"predictor", cell.entry.predictor}, {"threads", cell.entry.threads}, {"timed_out", cell.timed_out}};
+    put_share(row, cell);
     const std::pair<const char*, common::Mean> means[] = {{"actions", mean_over(cell.runs, actions)},
                                                           {"planning_seconds", mean_over(cell.runs, planning)},
                                                           {"seconds_per_plan", mean_over(cell.in_time, per_plan)},
@@ -256,10 +242,7 @@ Result<std::unique_ptr<Study>> read_push_study(yaml::Fields& fields, const std::
                               {"low", Uncertainty::kLow},
                               {"medium", Uncertainty::kMedium},
                               {"high", Uncertainty::kHigh}});
-  fields.section("seeds", true, [&](yaml::Fields& seeds) {
-    seeds.required("first", study.first_seed);
-    seeds.required("last", study.last_seed);
-  });
+  read_seeds(fields, study.first_seed, study.last_seed);
   fields.list("predictors", [&](yaml::Fields& entry) {
     study.entries.emplace_back();
     entry.required("predictor", study.entries.back().predictor);
@@ -268,7 +251,7 @@ Result<std::unique_ptr<Study>> read_push_study(yaml::Fields& fields, const std::
   if (study.chapter != 6 && study.chapter != 7) {
     return Error{Code::kInvalidArgument, fmt::format("{}: chapter: got {}, wanted 6 or 7", origin, study.chapter)};
   }
-  auto parameters_result = task::load_parameters(std::filesystem::path(origin).parent_path() / parameters);
+  auto parameters_result = parameters_beside(origin, parameters);
   if (!parameters_result) return parameters_result.error();
   study.parameters = *parameters_result;
   physics_pool::ThreadPool threads(1);

@@ -1,12 +1,10 @@
 #include "services/studies/experiment/robust_study.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
 
 #include "physics_pool/local/execution_world.hpp"
 #include "physics_pool/local/thread_pool.hpp"
@@ -103,27 +101,9 @@ Result<json> perform(const RobustStudy& study, const Case& one, std::stop_token 
   return record_of(one, *outcome_result, study.parameters.planner.step_duration);
 }
 
-// A number of a record, or kNone.
-double number(const json& run, const char* key) {
-  const auto found = run.find(key);
-  return found == run.end() || found->is_null() ? common::kNone : found->get<double>();
-}
-
-common::Mean mean_of(const std::vector<const json*>& runs, const char* key) {
-  std::vector<double> values;
-  for (const json* run : runs) {
-    if (const double value = number(*run, key); std::isfinite(value)) values.push_back(value);
-  }
-  return common::mean_of(values);
-}
-
 // Runs of one method.
-struct Cell {
+struct Cell : RunGroup {
   std::string method;
-  int successes = 0, broken = 0;
-  std::vector<const json*> runs;  // that came to an end
-
-  common::Share share() const { return common::wilson_interval(successes, static_cast<int>(runs.size())); }
 
   // Of all actions, those that nothing was looked at for.
   double open_share() const {
@@ -252,8 +232,8 @@ class RobustStudyRunner final : public Study {
       const common::Share share = cell.share();
       return std::tuple(share.low, double(share.successes) / share.runs, share.high);
     });
-    add("planning, s", [&](const Cell& cell) { return around(mean_of(cell.runs, "planning_seconds")); });
-    add("execution, s", [&](const Cell& cell) { return around(mean_of(cell.runs, "execution_seconds")); });
+    add("planning, s", [&](const Cell& cell) { return around(mean_over(cell.runs, "planning_seconds")); });
+    add("execution, s", [&](const Cell& cell) { return around(mean_over(cell.runs, "execution_seconds")); });
     add("open-loop share",
         [](const Cell& cell) { return std::tuple(cell.open_share(), cell.open_share(), cell.open_share()); });
     return panels;
@@ -266,13 +246,7 @@ class RobustStudyRunner final : public Study {
       Cell& cell = result.emplace_back();
       cell.method = method;
       for (const json& run : runs) {
-        if (run["method"] != method) continue;
-        if (ended_as(run, Ending::kBroken)) {
-          ++cell.broken;
-          continue;
-        }
-        cell.runs.push_back(&run);
-        cell.successes += run["success"] ? 1 : 0;
+        if (run["method"] == method) cell.add(run);
       }
     }
     return result;
@@ -301,12 +275,12 @@ class RobustStudyRunner final : public Study {
       broken += cell.broken;
       ends.push_back({cell.method, fmt::format("{}/{}", share.successes, share.runs),
                       common::interval_text(share.low, share.high), thesis_of(cell.method)});
-      costs.push_back({cell.method, to_text(mean_of(cell.runs, "planning_seconds"), 1),
-                       to_text(mean_of(cell.runs, "execution_seconds"), 1), to_text(mean_of(cell.runs, "rollouts"), 0),
-                       common::number_text(cell.open_share(), 2)});
-      metrics.push_back({cell.method, to_text(mean_of(cell.runs, "expected"), 2),
-                         to_text(mean_of(cell.runs, "nominal_expected"), 2),
-                         to_text(mean_of(cell.runs, "realized_expected"), 2)});
+      costs.push_back({cell.method, to_text(mean_over(cell.runs, "planning_seconds"), 1),
+                       to_text(mean_over(cell.runs, "execution_seconds"), 1),
+                       to_text(mean_over(cell.runs, "rollouts"), 0), common::number_text(cell.open_share(), 2)});
+      metrics.push_back({cell.method, to_text(mean_over(cell.runs, "expected"), 2),
+                         to_text(mean_over(cell.runs, "nominal_expected"), 2),
+                         to_text(mean_over(cell.runs, "realized_expected"), 2)});
     }
     for (const Pair& pair : pairs(all)) {
       against.push_back({pair.method + " and " + pair.other, std::to_string(pair.better), std::to_string(pair.worse),
@@ -326,17 +300,13 @@ class RobustStudyRunner final : public Study {
   }
 
   json row_of(const Cell& cell) const {
-    const common::Share share = cell.share();
     json row{{"method", cell.method},
-             {"successes", share.successes},
-             {"runs", share.runs},
-             {"broken", cell.broken},
-             {"interval", {common::number_or_null(share.low), common::number_or_null(share.high)}},
              {"open_loop_share", common::number_or_null(cell.open_share())},
              {"thesis", thesis_of(cell.method)}};
+    put_share(row, cell);
     for (const char* key : {"planning_seconds", "execution_seconds", "actions", "rollouts", "expected", "maximal",
                             "nominal_expected", "nominal_maximal", "realized_expected", "realized_maximal"}) {
-      put_mean(row, key, mean_of(cell.runs, key));
+      put_mean(row, key, mean_over(cell.runs, key));
     }
     return row;
   }
@@ -355,10 +325,7 @@ Result<std::unique_ptr<Study>> read_robust_study(yaml::Fields& fields, const std
   std::string parameters;
   fields.required("parameters", parameters);
   fields.required("methods", study.methods);
-  fields.section("seeds", true, [&](yaml::Fields& seeds) {
-    seeds.required("first", study.first_seed);
-    seeds.required("last", study.last_seed);
-  });
+  read_seeds(fields, study.first_seed, study.last_seed);
   fields.section("world", true, [&](yaml::Fields& world) {
     world.required("least_mass", study.bounds.least_mass);
     world.required("most_mass", study.bounds.most_mass);
@@ -370,13 +337,8 @@ Result<std::unique_ptr<Study>> read_robust_study(yaml::Fields& fields, const std
   });
   fields.optional("thesis", study.thesis);
   fields.optional("remark", study.remark);
-  const std::vector<std::string> known = planners::controller_names();
-  for (const std::string& method : study.methods) {
-    if (std::ranges::find(known, method) == known.end())
-      return invalid(origin + ": methods", "'" + method + "'", fmt::format("{}", fmt::join(known, ", ")));
-  }
-  if (study.methods.empty()) return invalid(origin + ": methods", "an empty list", "at least one");
-  auto parameters_result = task::load_parameters(std::filesystem::path(origin).parent_path() / parameters);
+  if (auto ok = check_methods(study.methods, origin + ": methods"); !ok) return ok.error();
+  auto parameters_result = parameters_beside(origin, parameters);
   if (!parameters_result) return parameters_result.error();
   study.parameters = *parameters_result;
   // No clock decides: actions and iterations are what is limited.

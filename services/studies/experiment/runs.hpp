@@ -3,6 +3,7 @@
 /// What studies of whole runs read of their records, and say of many.
 
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -15,6 +16,11 @@ namespace jostle::studies {
 
 inline bool ended_as(const nlohmann::json& run, planners::Ending ending) {
   return run.value("ending", "") == planners::to_string(ending);
+}
+/// Returns a number of a record; kNone where it has none.
+inline double number(const nlohmann::json& run, const char* key) {
+  const auto found = run.find(key);
+  return found == run.end() || found->is_null() ? common::kNone : found->get<double>();
 }
 inline double actions(const nlohmann::json& run) { return run["actions"]; }
 inline double planning(const nlohmann::json& run) { return run["planning_seconds"]; }  ///< s
@@ -39,12 +45,43 @@ std::vector<nlohmann::json> runs_of(const std::vector<nlohmann::json>& records, 
   return runs;
 }
 
-/// Returns the mean of `value` of each run.
+/// Runs that are alike but for their seeds: a cell of a table.
+struct RunGroup {
+  std::vector<const nlohmann::json*> runs;  ///< that came to an end, whatever it was; broken ones did not
+  int successes = 0, broken = 0;
+
+  void add(const nlohmann::json& run) {
+    if (ended_as(run, planners::Ending::kBroken)) {
+      ++broken;
+      return;
+    }
+    runs.push_back(&run);
+    successes += run["success"] ? 1 : 0;
+  }
+
+  common::Share share() const { return common::wilson_interval(successes, static_cast<int>(runs.size())); }
+};
+
+/// Returns the mean of `value` of each run that has one.
 template <class Value>
 common::Mean mean_over(const std::vector<const nlohmann::json*>& runs, Value value) {
   std::vector<double> values;
-  for (const nlohmann::json* run : runs) values.push_back(value(*run));
+  for (const nlohmann::json* run : runs) {
+    if (const double one = value(*run); std::isfinite(one)) values.push_back(one);
+  }
   return common::mean_of(values);
+}
+inline common::Mean mean_over(const std::vector<const nlohmann::json*>& runs, const char* key) {
+  return mean_over(runs, [key](const nlohmann::json& run) { return number(run, key); });
+}
+
+/// Puts how many runs there are and how many succeeded into a row of results.
+inline void put_share(nlohmann::json& row, const RunGroup& group) {
+  const common::Share share = group.share();
+  row["successes"] = share.successes;
+  row["runs"] = share.runs;
+  row["broken"] = group.broken;
+  row["interval"] = {common::number_or_null(share.low), common::number_or_null(share.high)};
 }
 
 /// Puts a mean into a row of results, and half its 95 % interval as `key`_half_width.

@@ -388,6 +388,20 @@ TEST_F(AdaptiveStudyRun, TakesOtherTasksMethodsLevelsAndParameters) {
   EXPECT_THROW(set_options(*sut, {"--tasks", "narrow"}), CLI::ParseError);
 }
 
+TEST_F(AdaptiveStudyRun, PlannersMayBelieveInAnotherNoiseThanTheWorlds) {
+  set_options(*sut, {"--seeds", "1", "--tasks", "strip", "--levels", "0.1", "--methods", "tampc,tampc:0.1,tampc:0"});
+  const json runs = finished(*sut).report.json["runs"];
+  ASSERT_EQ(runs.size(), 3u);
+  EXPECT_EQ(runs[0]["way"], runs[1]["way"]);
+  EXPECT_EQ(runs[2]["method"], "tampc:0");
+  for (const json& choice : runs[0]["way"][0]["considered"]) EXPECT_GT(choice["spread"], 0.0);
+  for (const json& choice : runs[2]["way"][0]["considered"]) EXPECT_EQ(choice["spread"], 0.0);
+  for (const char* method : {"tampc:2", "tampc:", "tampc:0.1x", "nobody", "nobody:0.1"}) {
+    set_options(*sut, {"--methods", method});
+    EXPECT_THAT(sut->prepare().error().message, HasSubstr("--methods: got '")) << method;
+  }
+}
+
 class RobustStudyRun : public StudyRun {
  protected:
   const Loaded sut =

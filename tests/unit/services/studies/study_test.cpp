@@ -41,8 +41,9 @@ TEST(LoadStudies, EveryFileThatNamesAStudyLoadsAndSaysWhatItIs) {
     EXPECT_FALSE(study->about().purpose.empty()) << name;
     EXPECT_FALSE(study->about().takes.empty()) << name;
   }
-  EXPECT_THAT(names, ::testing::IsSupersetOf({"fig-3.5", "fig-4.4", "fig-5.3", "fig-5.4", "fig-6.5", "fig-6.6",
-                                              "fig-6.7", "fig-7.2", "fig-7.3", "fig-7.4", "fig-7.5", "table-6.1"}));
+  EXPECT_THAT(names,
+              ::testing::IsSupersetOf({"fig-3.5", "fig-4.4", "fig-5.3", "fig-5.4", "fig-5.5", "fig-6.5", "fig-6.6",
+                                       "fig-6.7", "fig-7.2", "fig-7.3", "fig-7.4", "fig-7.5", "table-6.1"}));
 }
 
 TEST(LoadStudy, UnknownNameAndMereParametersAreToldApart) {

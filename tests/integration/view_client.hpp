@@ -22,9 +22,12 @@ namespace http = boost::beast::http;
 namespace websocket = boost::beast::websocket;
 using boost::asio::ip::tcp;
 
-inline tcp::socket connect_to(boost::asio::io_context& context, std::uint16_t port) {
+inline const boost::asio::ip::address kLoopback = boost::asio::ip::address_v4::loopback();
+
+inline tcp::socket connect_to(boost::asio::io_context& context, std::uint16_t port,
+                              const boost::asio::ip::address& address = kLoopback) {
   tcp::socket socket(context);
-  socket.connect({boost::asio::ip::address_v4::loopback(), port});
+  socket.connect({address, port});
   socket.set_option(tcp::no_delay(true));
   return socket;
 }
@@ -33,9 +36,10 @@ using Headers = std::map<std::string, std::string>;
 
 /// What a server answers to a request without a body.
 inline http::response<http::string_body> answer_of(std::uint16_t port, const std::string& target, Headers headers = {},
-                                                   http::verb verb = http::verb::get) {
+                                                   http::verb verb = http::verb::get,
+                                                   const boost::asio::ip::address& address = kLoopback) {
   boost::asio::io_context context;
-  tcp::socket socket = connect_to(context, port);
+  tcp::socket socket = connect_to(context, port, address);
   http::request<http::empty_body> request(verb, target, 11);
   headers.emplace("Host", "localhost:" + std::to_string(port));
   for (const auto& [name, value] : headers) request.set(name, value);
@@ -83,7 +87,9 @@ class ViewClient {
   };
 
   /// Throws boost::system::system_error where it is refused.
-  explicit ViewClient(std::uint16_t port, const std::string& target = "/") : socket_(connect_to(context_, port)) {
+  explicit ViewClient(std::uint16_t port, const std::string& target = "/",
+                      const boost::asio::ip::address& address = kLoopback)
+      : socket_(connect_to(context_, port, address)) {
     socket_.set_option(websocket::stream_base::decorator([](websocket::request_type& request) {
       request.set(http::field::sec_websocket_protocol, "foxglove.websocket.v1");
     }));

@@ -88,7 +88,7 @@ TEST(ViewServer, AnswersBadRequestsAndGoesOn) {
   EXPECT_THAT(complaint(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":9}]})"), HasSubstr("one of 1"));
   EXPECT_THAT(complaint(R"({"op":"unsubscribe","subscriptionIds":[3]})"), HasSubstr("subscriptionIds: got 3"));
   EXPECT_THAT(complaint(R"({"op":"setParameters","parameters":[{"name":"playback.time","value":1}]})"),
-              HasSubstr("what is live has no clock"));
+              HasSubstr("there is nothing to set"));
   viewer.send_binary("\x01publish");
   EXPECT_THAT(viewer.next_op("status")["message"].get<std::string>(), HasSubstr("takes no messages"));
   EXPECT_EQ(sut->counts().invalid_requests, 10u);
@@ -328,6 +328,36 @@ TEST_F(View, ShowsTypesOfUsersByTheirMsgFiles) {
   EXPECT_EQ(viewer.next_sample().sample(), wheel());
   EXPECT_EQ(channel["schemaName"], kWheelType);
   EXPECT_THAT(channel["schema"].get<std::string>(), HasSubstr("MSG: rover_msgs/Tread"));
+}
+
+// A viewer cancels, and can do nothing else; without --control not even that.
+TEST_F(View, CancelsAGoalWhereItMay) {
+  const auto viewing = program("jostle_view", {"--port", "0", "--control"});
+  const auto looking = program("jostle_view", {"--port", "0"});
+  ASSERT_TRUE(viewing->says("ready", kPatience)) << viewing->err();
+  ASSERT_TRUE(looking->says("ready", kPatience)) << looking->err();
+  ViewClient viewer(port_in(viewing->err())), onlooker(port_in(looking->err()));
+  const auto complaint = [](ViewClient& client, const std::string& name, const nlohmann::json& value) {
+    client.send({{"op", "setParameters"}, {"parameters", {{{"name", name}, {"value", value}}}}, {"id", "1"}});
+    return client.next_op("status")["message"].get<std::string>();
+  };
+  EXPECT_THAT(complaint(viewer, "task.cancel", true), HasSubstr("wanted a goal that is at work"));
+  start_planning();
+
+  EXPECT_THAT(complaint(viewer, "task.cancel", false), HasSubstr("task.cancel: got false"));
+  EXPECT_THAT(complaint(viewer, "playback.time", 1.0), HasSubstr("playback.time: got 1.0"));
+  EXPECT_THAT(complaint(onlooker, "task.cancel", true), HasSubstr("--control was not given"));
+  ASSERT_FALSE(run->code()) << run->err();
+  EXPECT_TRUE(soon(kPatience, [&] {  // as soon as it has heard of the goal
+    viewer.send(
+        {{"op", "setParameters"}, {"parameters", {{{"name", "task.cancel"}, {"value", true}}}}, {"id", "mine"}});
+    const auto frame =
+        viewer.next([](const auto& one) { return one.op() == "status" || one.op() == "parameterValues"; });
+    return frame.op() == "parameterValues";
+  }));
+
+  EXPECT_EQ(run->wait(kPatience), 130) << run->err();
+  EXPECT_THAT(run->err(), HasSubstr("cancelled"));
 }
 
 TEST_F(View, LastsAsLongAsTheRunThatWantsIt) {

@@ -6,7 +6,7 @@ import { Channel, FoxgloveClient, Parameter } from "@foxglove/ws-protocol";
 
 export interface Listener {
   onState(state: "connecting" | "connected" | "closed"): void;
-  onInfo(info: { name: string; hasPlayback: boolean }): void;
+  onInfo(info: { name: string; hasPlayback: boolean; hasControl: boolean }): void;
   /** `time`: ns since 1970, when the sample was recorded or came. */
   onMessage(topic: string, type: string, message: unknown, time: bigint): void;
   onTime(time: bigint): void;
@@ -46,9 +46,10 @@ export class Connection {
     });
     client.on("error", () => {}); // "close" follows
     client.on("serverInfo", (info) => {
-      const hasPlayback = info.capabilities.includes("parameters");
-      this.listener.onInfo({ name: info.name, hasPlayback });
-      if (hasPlayback) client.subscribeParameterUpdates([]);
+      const hasPlayback = info.capabilities.includes("time");
+      const hasParameters = info.capabilities.includes("parameters");
+      this.listener.onInfo({ name: info.name, hasPlayback, hasControl: hasParameters && !hasPlayback });
+      if (hasParameters) client.subscribeParameterUpdates([]);
     });
     client.on("advertise", (channels) => channels.forEach((channel) => this.#subscribe(client, channel)));
     client.on("message", ({ subscriptionId, timestamp, data }) => {

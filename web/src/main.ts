@@ -124,9 +124,10 @@ const connection = new Connection(url.href, kTypes, {
     shown.textContent = state;
     shown.className = state;
   },
-  onInfo({ name, hasPlayback }) {
+  onInfo({ name, hasPlayback, hasControl }) {
     element("source").textContent = name;
     playback.show(hasPlayback);
+    element("cancel").hidden = !hasControl;
   },
   onMessage(_topic, type, message, time) {
     now = time;
@@ -139,6 +140,7 @@ const connection = new Connection(url.href, kTypes, {
   onStatus: (text) => tell(text, true),
 });
 const playback = new PlaybackControls((name, value) => connection.set(name, value));
+element("cancel").addEventListener("click", () => connection.set("task.cancel", true));
 
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey) return;

@@ -62,27 +62,23 @@ int view(const Arguments& arguments, ViewServerOptions options, std::optional<in
     options.name = fmt::format("jostle: {}", arguments.bag);
     options.has_playback = true;
   }
-  ViewServer::Watcher watcher;
-  if (bag) watcher.on_set = [&](const ViewParameters& wanted) { return bag->set(wanted); };
-  auto server_result = ViewServer::start(std::move(options), std::move(watcher));
+  LiveSource live({.domain = domain,
+                   .selection = selection,
+                   .messages = *messages_result,
+                   .control = options.has_control,
+                   .on_warning = say});
+  const auto on_set = [&](const ViewParameters& wanted) { return bag ? bag->set(wanted) : live.set(wanted); };
+  auto server_result = ViewServer::start(std::move(options), {.on_set = on_set});
   if (!server_result) return fail(server_result.error());
   ViewServer& server = **server_result;
-  std::unique_ptr<LiveSource> live;
-  if (!bag) {
-    auto live_result = LiveSource::open(
-        {.domain = domain, .selection = selection, .messages = *messages_result, .on_warning = say}, server);
-    if (!live_result) return fail(live_result.error());
-    live = std::move(live_result).value();
-  }
   // Whoever started this program waits for the word "ready".
-  say(fmt::format("ready: {} at {}",
-                  bag ? fmt::format("{} messages of {}", bag->info().messages, arguments.bag)
-                      : fmt::format("domain {}", live->domain()),
-                  server.url()));
+  const auto say_ready = [&](const std::string& what) { say(fmt::format("ready: {} at {}", what, server.url())); };
   if (bag) {
+    say_ready(fmt::format("{} messages of {}", bag->info().messages, arguments.bag));
     bag->run(server, stop);
   } else {
-    common::wait_for(stop);
+    auto ok = live.run(server, stop, [&](int number) { say_ready(fmt::format("domain {}", number)); });
+    if (!ok) return fail(ok.error());
   }
   const ViewServerCounts counts = server.counts();
   say(fmt::format("{} samples to viewers, {} dropped for slow ones", counts.samples_out, counts.dropped));
@@ -116,6 +112,10 @@ int main(int argc, char** argv) {
   app.add_option("--allow-origin", options.origins,
                  "Let a page from elsewhere connect, such as https://app.foxglove.dev; may be given again");
   app.add_flag("--paused", arguments.paused, "Wait at the beginning of the bag")->needs(bag);
+  app.add_flag("--control", options.has_control,
+               "Let viewers cancel the goal that is at work, and nothing else. On a protected domain it takes an\n"
+               "identity with the role robot")
+      ->excludes(bag);
   common::add_process_options(app, process);
   app.footer(
       "docs/view.md says how Foxglove connects.\n"

@@ -143,9 +143,13 @@ Result<ViewRequest> parse_view_request(std::string_view text) {
   return invalid("op", shown(op), "subscribe, unsubscribe, or one about parameters: this server only shows");
 }
 
-std::string server_info_text(const std::string& name, bool has_playback, const std::string& session) {
+std::string server_info_text(const std::string& name, bool has_time, bool has_parameters, const std::string& session) {
   json capabilities = json::array();
-  if (has_playback) capabilities = {"time", "parameters", "parametersSubscribe"};
+  if (has_time) capabilities.push_back("time");
+  if (has_parameters) {
+    capabilities.push_back("parameters");
+    capabilities.push_back("parametersSubscribe");
+  }
   return dump({{"op", "serverInfo"},
                {"name", name},
                {"capabilities", std::move(capabilities)},

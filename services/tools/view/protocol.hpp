@@ -54,7 +54,8 @@ using ViewRequest = std::variant<Subscribe, Unsubscribe, GetParameters, SetParam
 Result<ViewRequest> parse_view_request(std::string_view text);
 
 /// These return text frames for viewers. `session` is another one each time a server starts.
-std::string server_info_text(const std::string& name, bool has_playback, const std::string& session);
+/// `has_time`: it tells what time it is; `has_parameters`: there are some.
+std::string server_info_text(const std::string& name, bool has_time, bool has_parameters, const std::string& session);
 /// Channels by number, in the order given: the first has the number `first`.
 std::string advertise_text(std::uint32_t first, const std::vector<bags::Topic>& topics);
 std::string status_text(ViewStatus level, const std::string& message);

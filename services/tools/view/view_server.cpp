@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
@@ -11,16 +10,15 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
-#include <deque>
 #include <map>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <thread>
 #include <utility>
 
 #include "services/common/process/files.hpp"
 #include "services/common/process/random_id.hpp"
+#include "services/tools/view/viewing.hpp"
 
 namespace jostle::tools {
 namespace {
@@ -36,24 +34,12 @@ using Request = http::request<http::string_body>;
 constexpr std::chrono::seconds kHandshake{10};  // to ask, and to be answered
 constexpr std::chrono::seconds kIdle{30};       // a viewer that answers no ping is gone
 constexpr std::uint32_t kMostHeader = 16 << 10;
-constexpr std::uint64_t kMostBody = 1024;         // nobody sends any
-constexpr std::size_t kMostWords = 16 << 20;      // bytes of text that wait for one viewer
-constexpr std::size_t kMostSubscriptions = 4096;  // of one viewer
-constexpr std::size_t kMostUndecided = 64;        // connections that have not asked for anything yet
-constexpr std::size_t kBookkeeping = 64;          // bytes that a sample without data takes all the same
+constexpr std::uint64_t kMostBody = 1024;   // nobody sends any
+constexpr std::size_t kMostUndecided = 64;  // connections that have not asked for anything yet
 
 constexpr std::string_view kNoPage =
     "<!doctype html><title>Jostle</title><p>The page was not built: that takes Node.js, npm and, once, a registry. "
     "Foxglove connects to this address all the same.";
-
-struct Sample {
-  bags::Time time = 0;
-  std::vector<std::byte> data;
-
-  std::size_t memory() const { return kBookkeeping + data.size(); }
-};
-using SharedSample = std::shared_ptr<const Sample>;
-using SharedText = std::shared_ptr<const std::string>;
 
 struct File {
   std::string type, content;
@@ -134,18 +120,6 @@ std::string_view token_in(const Request& request) {
 }  // namespace
 
 struct ViewServer::Impl {
-  struct Channel {
-    bags::Topic topic;
-    bool keeps = false;
-    SharedSample last;
-  };
-
-  // A sample on its way to a viewer.
-  struct Parcel {
-    std::uint32_t subscription = 0;
-    SharedSample sample;
-  };
-
   class Connection;
   class Viewer;
 
@@ -176,12 +150,9 @@ struct ViewServer::Impl {
   std::uint16_t port = 0;
   std::size_t undecided = 0;  // the server's thread only
 
-  mutable std::mutex mutex;  // guards all below, and what viewers have waiting
-  std::deque<Channel> channels;
+  mutable std::mutex mutex;  // guards all below, and what viewers have of it
+  Exhibition shared;
   std::vector<std::shared_ptr<Viewer>> viewers;
-  ViewParameters parameters;
-  std::optional<bags::Time> time;
-  ViewServerCounts count;
 
   std::jthread thread;  // last: ends before what it uses
 };
@@ -190,7 +161,8 @@ struct ViewServer::Impl {
 // run on the server's.
 class ViewServer::Impl::Viewer : public std::enable_shared_from_this<Viewer> {
  public:
-  Viewer(Impl& server, beast::tcp_stream stream) : server_(server), socket_(std::move(stream)) {}
+  Viewer(Impl& server, beast::tcp_stream stream)
+      : server_(server), socket_(std::move(stream)), viewing_(server.shared, server.options.most_waiting) {}
 
   void start(const Request& request) {
     socket_.set_option(websocket::stream_base::timeout{kHandshake, kIdle, true});
@@ -201,43 +173,26 @@ class ViewServer::Impl::Viewer : public std::enable_shared_from_this<Viewer> {
     socket_.async_accept(request, [self = shared_from_this()](error_code error) { self->accepted(error); });
   }
 
-  void say_locked(SharedText text) {
-    if (closing_) return;
-    words_bytes_ += text->size();
-    words_.push_back(std::move(text));
-    if (words_bytes_ > kMostWords) {  // who neither reads nor stops asking
-      closing_ = true;
-      awake_ = false;
-    }
+  void say_locked(const SharedText& text) {
+    viewing_.say(text);
     wake_locked();
   }
 
-  void say_locked(std::string text) { say_locked(std::make_shared<const std::string>(std::move(text))); }
-
   void send_locked(std::size_t channel, const SharedSample& sample) {
-    const auto found = subscribers_.find(channel);
-    if (found == subscribers_.end() || closing_) return;
-    for (const std::uint32_t subscription : found->second) put_locked({subscription, sample});
-    wake_locked();
+    if (viewing_.send(channel, sample)) wake_locked();
   }
 
   void set_time_locked(bags::Time time) {
-    time_ = time;
+    viewing_.set_time(time);
     wake_locked();
   }
 
-  void forget_locked() {
-    parcels_.clear();
-    parcels_bytes_ = 0;
-  }
+  void forget_locked() { viewing_.forget(); }
 
   // Of values that have changed.
   void tell_locked(const ViewParameters& changed) {
-    ViewParameters wanted;
-    for (const auto& [name, value] : changed) {
-      if (follows_all_ || followed_.contains(name)) wanted[name] = value;
-    }
-    if (!wanted.empty()) say_locked(parameters_text(wanted, {}));
+    viewing_.tell(changed);
+    wake_locked();
   }
 
  private:
@@ -246,37 +201,24 @@ class ViewServer::Impl::Viewer : public std::enable_shared_from_this<Viewer> {
     {
       const std::lock_guard lock(server_.mutex);
       if (server_.viewers.size() >= server_.options.most_viewers) {
-        ++server_.count.refused;
+        ++server_.shared.count.refused;
         closing_ = true;
       }
       server_.viewers.push_back(shared_from_this());
-      say_first_locked();
+      const ViewServerOptions& options = server_.options;
+      viewing_.begin(server_info_text(options.name, options.has_playback, options.has_playback || options.has_control,
+                                      server_.session));
     }
     read();
     write();
   }
 
-  void say_first_locked() {
-    words_.push_back(std::make_shared<const std::string>(
-        server_info_text(server_.options.name, server_.options.has_playback, server_.session)));
-    std::vector<bags::Topic> topics;
-    for (const Channel& channel : server_.channels) topics.push_back(channel.topic);
-    words_.push_back(std::make_shared<const std::string>(advertise_text(0, topics)));
-    for (const SharedText& text : words_) words_bytes_ += text->size();
-    time_ = server_.time;
-  }
-
-  void put_locked(Parcel parcel) {
-    parcels_bytes_ += parcel.sample->memory();
-    parcels_.push_back(std::move(parcel));
-    while (parcels_bytes_ > server_.options.most_waiting && parcels_.size() > 1) {
-      parcels_bytes_ -= parcels_.front().sample->memory();
-      parcels_.pop_front();
-      ++server_.count.dropped;
-    }
-  }
-
   void wake_locked() {
+    if (closing_) return;
+    if (viewing_.is_overfull()) {  // who neither reads nor stops asking
+      closing_ = true;
+      awake_ = false;
+    }
     if (std::exchange(awake_, true)) return;
     asio::post(server_.context, [self = shared_from_this()] { self->write(); });
   }
@@ -296,112 +238,46 @@ class ViewServer::Impl::Viewer : public std::enable_shared_from_this<Viewer> {
     auto done = request_result ? perform(*request_result) : Result<void>(request_result.error());
     if (done) return;
     const std::lock_guard lock(server_.mutex);
-    ++server_.count.invalid_requests;
-    say_locked(status_text(ViewStatus::kError, done.error().message));
+    ++server_.shared.count.invalid_requests;
+    say_locked(std::make_shared<const std::string>(status_text(ViewStatus::kError, done.error().message)));
   }
 
   Result<void> perform(const ViewRequest& request) {
-    return std::visit([this](const auto& one) { return perform(one); }, request);
-  }
-
-  Result<void> perform(const Subscribe& request) {
+    if (const auto* set = std::get_if<SetParameters>(&request); set && server_.watcher.on_set) return set_all(*set);
     const std::lock_guard lock(server_.mutex);
-    for (const auto& [id, channel] : request.subscriptions) {
-      if (channel >= server_.channels.size()) {
-        return invalid("channelId", std::to_string(channel), fmt::format("one of {}", server_.channels.size()));
-      }
-      if (subscriptions_.size() >= kMostSubscriptions) {
-        return invalid("subscriptions", "one more", fmt::format("at most {}", kMostSubscriptions));
-      }
-      if (!subscriptions_.emplace(id, channel).second) {
-        return invalid("id", fmt::format("{} again", id), "another number for every subscription");
-      }
-      subscribers_[channel].push_back(id);
-      if (const SharedSample& last = server_.channels[channel].last) put_locked({id, last});
-    }
+    auto done = viewing_.perform(request);
     wake_locked();
-    return {};
+    return done;
   }
 
-  Result<void> perform(const Unsubscribe& request) {
-    const std::lock_guard lock(server_.mutex);
-    for (const std::uint32_t id : request.subscriptions) {
-      const auto found = subscriptions_.find(id);
-      if (found == subscriptions_.end()) return invalid("subscriptionIds", std::to_string(id), "a subscription");
-      std::erase(subscribers_[found->second], id);
-      subscriptions_.erase(found);
-    }
-    return {};
-  }
-
-  Result<void> perform(const GetParameters& request) {
-    const std::lock_guard lock(server_.mutex);
-    ViewParameters wanted;
-    for (const auto& [name, value] : server_.parameters) {
-      if (request.names.empty() || std::ranges::count(request.names, name) > 0) wanted[name] = value;
-    }
-    say_locked(parameters_text(wanted, request.id));
-    return {};
-  }
-
-  Result<void> perform(const SetParameters& request) {
-    if (!server_.watcher.on_set) return invalid("op", "setParameters", "none: what is live has no clock to set");
+  Result<void> set_all(const SetParameters& request) {
     auto set_result = server_.watcher.on_set(request.values);  // takes the lock to tell others
     if (!set_result) return set_result.error();
     if (!request.id) return {};
     const std::lock_guard lock(server_.mutex);
-    say_locked(parameters_text(*set_result, request.id));
+    say_locked(std::make_shared<const std::string>(parameters_text(*set_result, request.id)));
     return {};
   }
 
-  Result<void> perform(const FollowParameters& request) {
-    const std::lock_guard lock(server_.mutex);
-    if (request.names.empty()) {
-      follows_all_ = request.follow;
-      if (!request.follow) followed_.clear();
-    }
-    for (const std::string& name : request.names) {
-      if (!request.follow) followed_.erase(name);
-      if (request.follow && server_.parameters.contains(name)) followed_.insert(name);
-    }
-    if (request.follow) tell_locked(server_.parameters);
-    return {};
-  }
-
-  // What is to go out next: words before times before samples.
   void write() {
-    std::vector<asio::const_buffer> buffers;
     {
       const std::lock_guard lock(server_.mutex);
       if (closing_) return close();
       if (writing_) return;
-      if (!words_.empty()) {
-        text_ = std::move(words_.front());
-        words_.pop_front();
-        words_bytes_ -= text_->size();
-        buffers = {asio::buffer(*text_)};
-        socket_.text(true);
-      } else if (time_) {
-        frame_ = time_frame(*std::exchange(time_, std::nullopt));
-        buffers = {asio::buffer(frame_)};
-        socket_.binary(true);
-      } else if (!parcels_.empty()) {
-        const Parcel parcel = std::move(parcels_.front());
-        parcels_.pop_front();
-        sample_ = parcel.sample;
-        parcels_bytes_ -= sample_->memory();
-        header_ = sample_header(parcel.subscription, sample_->time);
-        buffers = {asio::buffer(header_), asio::buffer(sample_->data.data(), sample_->data.size())};
-        socket_.binary(true);
-        ++server_.count.samples_out;
-      } else {
-        awake_ = false;
-        return;
-      }
-      awake_ = true;
-      server_.count.bytes_out += beast::buffer_bytes(buffers);
+      auto frame = viewing_.next();
+      awake_ = frame.has_value();
+      if (!frame) return;
+      frame_ = *std::move(frame);
     }
     writing_ = true;
+    std::vector<asio::const_buffer> buffers;
+    if (frame_.text) {
+      buffers = {asio::buffer(*frame_.text)};
+    } else {
+      buffers = {asio::buffer(frame_.head.data(), frame_.head_size)};
+      if (frame_.sample) buffers.emplace_back(frame_.sample->data.data(), frame_.sample->data.size());
+    }
+    socket_.text(frame_.text != nullptr);
     socket_.async_write(buffers, [self = shared_from_this()](error_code error, std::size_t) {
       self->writing_ = false;
       if (error) return self->leave();
@@ -426,24 +302,13 @@ class ViewServer::Impl::Viewer : public std::enable_shared_from_this<Viewer> {
   websocket::stream<beast::tcp_stream> socket_;
   beast::flat_buffer request_;
 
-  // What is being written.
   bool writing_ = false;
-  SharedText text_;
-  SharedSample sample_;
-  std::array<std::uint8_t, 13> header_{};
-  std::array<std::uint8_t, 9> frame_{};
+  ViewFrame frame_;  // that is being written
 
   // Guarded by Impl::mutex.
   bool awake_ = true;  // write() runs, or will
   bool closing_ = false;
-  std::map<std::uint32_t, std::size_t> subscriptions_;             // channels, by the viewer's number
-  std::map<std::size_t, std::vector<std::uint32_t>> subscribers_;  // the reverse
-  std::set<std::string> followed_;
-  bool follows_all_ = false;
-  std::deque<SharedText> words_;
-  std::deque<Parcel> parcels_;
-  std::size_t words_bytes_ = 0, parcels_bytes_ = 0;
-  std::optional<bags::Time> time_;
+  Viewing viewing_;
 };
 
 // One that has just come, until it is known what it wants.
@@ -566,7 +431,7 @@ http::response<http::string_body> ViewServer::Impl::answer(const Request& reques
     response.result(refused->first);
     response.body() = std::move(refused->second) + "\n";
     const std::lock_guard lock(mutex);
-    ++count.refused;
+    ++shared.count.refused;
   } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
     response.result(http::status::method_not_allowed);
     response.set(http::field::allow, "GET, HEAD");
@@ -586,9 +451,9 @@ http::response<http::string_body> ViewServer::Impl::answer(const Request& reques
 
 ViewServerCounts ViewServer::Impl::counts() const {
   const std::lock_guard lock(mutex);
-  ViewServerCounts counts = count;
+  ViewServerCounts counts = shared.count;
   counts.viewers = viewers.size();
-  counts.channels = channels.size();
+  counts.channels = shared.channels.size();
   return counts;
 }
 
@@ -631,31 +496,31 @@ std::string ViewServer::url() const {
 
 int ViewServer::add_channel(const bags::Topic& topic, bool keeps) {
   const std::lock_guard lock(impl_->mutex);
-  const auto number = static_cast<std::uint32_t>(impl_->channels.size());
-  impl_->channels.push_back({topic, keeps, nullptr});
+  const auto number = static_cast<std::uint32_t>(impl_->shared.channels.size());
+  impl_->shared.channels.push_back({topic, keeps, nullptr});
   const auto text = std::make_shared<const std::string>(advertise_text(number, {topic}));
   for (const auto& viewer : impl_->viewers) viewer->say_locked(text);
   return static_cast<int>(number);
 }
 
 void ViewServer::send(int channel, bags::Time time, std::span<const std::byte> data) {
-  const auto sample = std::make_shared<const Sample>(Sample{time, {data.begin(), data.end()}});
+  const auto sample = std::make_shared<const ShownSample>(ShownSample{time, {data.begin(), data.end()}});
   const auto place = static_cast<std::size_t>(channel);
   const std::lock_guard lock(impl_->mutex);
-  ++impl_->count.samples_in;
-  if (impl_->channels[place].keeps) impl_->channels[place].last = sample;
+  ++impl_->shared.count.samples_in;
+  if (impl_->shared.channels[place].keeps) impl_->shared.channels[place].last = sample;
   for (const auto& viewer : impl_->viewers) viewer->send_locked(place, sample);
 }
 
 void ViewServer::set_time(bags::Time time) {
   const std::lock_guard lock(impl_->mutex);
-  impl_->time = time;
+  impl_->shared.time = time;
   for (const auto& viewer : impl_->viewers) viewer->set_time_locked(time);
 }
 
 void ViewServer::start_over() {
   const std::lock_guard lock(impl_->mutex);
-  for (Impl::Channel& channel : impl_->channels) channel.last.reset();
+  for (Exhibition::Channel& channel : impl_->shared.channels) channel.last.reset();
   for (const auto& viewer : impl_->viewers) viewer->forget_locked();
 }
 
@@ -663,10 +528,10 @@ void ViewServer::set_parameters(const ViewParameters& values) {
   const std::lock_guard lock(impl_->mutex);
   ViewParameters changed;
   for (const auto& [name, value] : values) {
-    const auto known = impl_->parameters.find(name);
-    if (known == impl_->parameters.end() || known->second != value) changed[name] = value;
+    const auto known = impl_->shared.parameters.find(name);
+    if (known == impl_->shared.parameters.end() || known->second != value) changed[name] = value;
   }
-  impl_->parameters = values;
+  impl_->shared.parameters = values;
   if (changed.empty()) return;
   for (const auto& viewer : impl_->viewers) viewer->tell_locked(changed);
 }

@@ -25,6 +25,7 @@ struct ViewServerOptions {
   std::vector<std::string> origins;     ///< of pages elsewhere that may connect, "https://app.foxglove.dev"
   std::filesystem::path page;           ///< folder of the page's files; they are read when the server starts
   bool has_playback = false;            ///< there is a clock that viewers may set, by parameters
+  bool has_control = false;             ///< there is something else that they may set
   std::size_t most_viewers = 256;       ///< more are refused
   std::size_t most_waiting = 4 << 20;   ///< bytes of samples that wait for one viewer; the oldest are dropped
   std::size_t most_request = 64 << 10;  ///< bytes of a request; a longer one ends its connection

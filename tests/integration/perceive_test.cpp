@@ -93,6 +93,18 @@ TEST_F(PerceiveTrouble, EyesThatAreGoneEndTheRunByTheirName) {
   EXPECT_THAT(run->err(), HasSubstr("the eyes ended: killed by signal 9"));
 }
 
+class PerceiveFaults : public RunFixture {};
+
+// Noise, hidden objects, swapped markers and late frames, all of them ordered.
+TEST_F(PerceiveFaults, OfMotionCaptureThatWereOrderedAreSurvived) {
+  const std::string report = folder.path() / "run.json";
+  const int code =
+      finish({easy, "--objects", "mocap-sim", "--mocap-noise", "0.002", "--mocap-hidden", "0.1", "--mocap-swapped",
+              "0.05", "--mocap-latency", "0.02", "--workers", "2", "--parameters", plain, "--json", report});
+  ASSERT_EQ(code, 0) << run->err();
+  EXPECT_TRUE(nlohmann::json::parse(contents(report))["success"]);
+}
+
 TEST_F(PerceiveTrouble, NobodyThereIsSaid) {
   const auto sut = program("jostle_perceive", {"mocap", "--host", "127.0.7.7"});
   EXPECT_TRUE(sut->says("waiting: 127.0.7.7:1510: no answer so far", kPatience)) << sut->err();
@@ -106,6 +118,8 @@ TEST_F(PerceiveTrouble, WhatIsNoSensorIsRefused) {
   EXPECT_THAT(run->err(), HasSubstr("wanted sim, mocap-sim, camera-sim or mocap:HOST"));
   EXPECT_EQ(finish({easy, "--objects", "mocap:10.0.0.1"}), 2);
   EXPECT_THAT(run->err(), HasSubstr("the arm's world is simulated"));
+  EXPECT_EQ(finish({easy, "--mocap-noise", "0.01"}), 2);
+  EXPECT_THAT(run->err(), HasSubstr("wanted mocap-sim: only it has faults"));
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "physics_pool/scene/task_kind.hpp"
 #include "planners/execution/execution.hpp"
 #include "services/common/process/child_process.hpp"
 #include "services/common/process/exit_codes.hpp"
@@ -35,13 +34,11 @@ json frames_of(const json& states, const RunOptions& options, const json& report
   const std::vector<double> times = times_of(options, report);
   const std::size_t count = states.size();
   const std::size_t shown = std::min(count, kMostFrames);
-  const bool success = report["success"];
   for (std::size_t i = 0; i < shown; ++i) {
     const std::size_t at = shown == 1 ? 0 : i * (count - 1) / (shown - 1);
     std::string caption = fmt::format("{}t = {:.3g} s", options.plan_only ? "plan, " : "", times.at(at) - times.at(0));
     if (at + 1 == count && !options.plan_only) {
-      caption += success ? fmt::format("  ({})", physics_pool::find_task_kind(options.scene.task.kind)->achieved)
-                         : fmt::format("  ({})", report["reason"].get<std::string>());
+      caption += fmt::format("  ({})", report["reason"].get<std::string>());
     }
     frames.push_back({{"caption", caption}, {"q", states[at]}});
   }

@@ -61,7 +61,8 @@ TEST_F(Goal, IsPrintedAsAnActionsGoalAndSentToNobody) {
   ASSERT_EQ(ask({"--print-action", "--seed", "7"}), 0) << asked->err();
 
   const json goal = json::parse(asked->out(), nullptr, false)["goal"];
-  EXPECT_EQ(physics_pool::parse_scene(goal["execution_scene"].get<std::string>(), "printed").value().task.kind, "grasp");
+  EXPECT_EQ(physics_pool::parse_scene(goal["execution_scene"].get<std::string>(), "printed").value().task.kind,
+            "grasp");
   EXPECT_EQ(goal["controller"], "or");
   EXPECT_EQ(goal["seed"], 7);
 }

@@ -120,7 +120,9 @@ class RosClient {
     dds::SampleInfo info;
     while (auto response = next_sample<Response>(*answers_, info)) {
       const auto& related = info.related_sample_identity;
-      if (related.writer_guid() == answers_->guid() && static_cast<std::int64_t>(related.sequence_number().to64long()) == number) return response;
+      if (related.writer_guid() == answers_->guid() &&
+          static_cast<std::int64_t>(related.sequence_number().to64long()) == number)
+        return response;
       ++others;
     }
     return {};

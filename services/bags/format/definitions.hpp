@@ -34,10 +34,9 @@ std::string ros_topic_name(const std::string& topic);
 /// Returns all types that have a definition, sorted.
 std::vector<std::string> known_types();
 
-/// Makes definitions, by type, from IDL: modules of modules (msg, srv, action) of structs, as idl/msg has them. A module
-/// `Name_Constants` of `const TYPE NAME = VALUE;` holds the constants of the struct `Name`, as ROS 2
-/// writes them.
-/// Error kInvalidArgument with file name and line.
+/// Makes definitions, by type, from IDL: modules of modules (msg, srv, action) of structs, as idl/msg has them. A
+/// module `Name_Constants` of `const TYPE NAME = VALUE;` holds the constants of the struct `Name`, as ROS 2 writes
+/// them. Error kInvalidArgument with file name and line.
 Result<std::map<std::string, std::string>> definitions_of_idl(
     const std::vector<std::pair<std::string_view, std::string_view>>& files);
 

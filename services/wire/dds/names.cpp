@@ -53,7 +53,8 @@ Result<std::string> parse_namespace(const std::string& text) {
 std::string in_namespace(const std::string& space, const std::string& topic) {
   // Of topics, and of requests and replies of services.
   for (const std::string_view root : {std::string_view("rt/"), std::string_view("rq/"), std::string_view("rr/")}) {
-    if (!space.empty() && topic.starts_with(root)) return fmt::format("{}{}/{}", root, space, topic.substr(root.size()));
+    if (!space.empty() && topic.starts_with(root))
+      return fmt::format("{}{}/{}", root, space, topic.substr(root.size()));
   }
   return topic;
 }

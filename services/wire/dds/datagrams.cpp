@@ -79,7 +79,6 @@ std::size_t least_size(std::uint8_t kind) {
     case kDataFragments:
       return 32;
     case kHeartbeat:
-      return 28;
     case kGap:
       return 28;
     case kAckNack:

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "planners/approach/straight_reach.hpp"
+#include "planners/guided/guided_start.hpp"
 
 namespace jostle::planners {
 namespace {
@@ -121,16 +122,8 @@ Result<Plan> ArmStart::plan(const Problem& problem, TimePoint deadline, std::sto
     poses.push_back(Eigen::Translation3d(q[0], q[1], height) *
                     Eigen::Isometry3d(Eigen::AngleAxisd(q[2], Eigen::Vector3d::UnitZ())));
   }
-  Problem begun = problem;
-  begun.initial = follow(geometry_, geometry_.view(problem.x0).joints(), poses, step_duration_);
-  const std::vector<double> still(static_cast<std::size_t>(problem.initial.nu), 0.0);
-  while (begun.initial.steps() < problem.initial.steps()) begun.initial.append(still);
-  begun.rollouts -= std::min(problem.rollouts, way_result->rollouts);
-  auto plan_result = planner_->plan(begun, deadline, std::move(stop));
-  if (!plan_result) return plan_result;
-  plan_result->rollouts += way_result->rollouts;
-  plan_result->iterations += way_result->iterations;
-  return plan_result;
+  ControlSequence initial = follow(geometry_, geometry_.view(problem.x0).joints(), poses, step_duration_);
+  return plan_from(*planner_, problem, std::move(initial), *way_result, deadline, std::move(stop));
 }
 
 }  // namespace jostle::planners

@@ -28,4 +28,10 @@ class GuidedStart final : public Planner {
   std::unique_ptr<Planner> planner_;
 };
 
+/// Plans as `planner` does, but from `initial`, which a guide came to with `way`: no control fills it up to the length
+/// of the problem's own, and what `way` took counts towards the problem's rollouts and the plan's. Errors   the
+/// planner's
+Result<Plan> plan_from(Planner& planner, const Problem& problem, ControlSequence initial, const Plan& way,
+                       TimePoint deadline, std::stop_token stop);
+
 }  // namespace jostle::planners

@@ -27,6 +27,8 @@ const char* to_string(Ending ending) {
       return "broken";
     case Ending::kRefused:
       return "refused";
+    case Ending::kInvalid:
+      return "invalid";
   }
   return "unknown";
 }

@@ -80,8 +80,9 @@ enum class Ending : std::uint8_t {
   kFailed = 2,  ///< it came to an end that was not the wanted one
   kTimedOut = 3,
   kCancelled = 4,
-  kBroken = 5,  ///< parts of the system failed
-  kRefused = 6  ///< never begun
+  kBroken = 5,   ///< parts of the system failed
+  kRefused = 6,  ///< never begun
+  kInvalid = 7   ///< never begun: the goal is malformed, or the world that runs is not its own
 };
 
 /// Returns words such as "succeeded" or "timed out".

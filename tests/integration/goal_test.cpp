@@ -14,6 +14,7 @@ namespace jostle::tests {
 namespace {
 
 using nlohmann::json;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class Goal : public RunFixture {
@@ -55,6 +56,23 @@ TEST_F(Goal, OfNobodySaysWhoIsMissingAndHowToStartIt) {
     EXPECT_EQ(ask({"--wait", "2"}), 3);
     return asked->err().find("jostle sim") != std::string::npos;
   })) << asked->err();
+}
+
+TEST_F(Goal, OfAnotherSceneThanTheWorldsIsRefused) {
+  const auto coordinator = start_coordinator();
+  physics_pool::Scene other = three_objects();
+  other.objects.back().mass *= 2;
+  const auto world = program("jostle_sim", {folder.write("other.yaml", physics_pool::to_yaml(other))});
+  const std::string file = folder.path() / "result.json";
+
+  EXPECT_EQ(ask({"--wait", "60", "--json", file}), 2) << asked->out();
+
+  EXPECT_THAT(asked->err(),
+              AllOf(HasSubstr("got a world simulated in the scene of hash " + to_string(scene_hash(other))),
+                    HasSubstr("wanted " + to_string(scene_hash(three_objects())))));
+  EXPECT_THAT(asked->out(), HasSubstr("INVALID"));
+  EXPECT_EQ(json::parse(contents(file), nullptr, false)["ending"], "invalid");
+  EXPECT_FALSE(coordinator->code()) << "it serves the next goal";
 }
 
 TEST_F(Goal, IsPrintedAsAnActionsGoalAndSentToNobody) {

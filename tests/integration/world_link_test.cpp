@@ -396,7 +396,7 @@ TEST_F(CoordinatorProcess, AnswersBadGoalsWithTheFieldAndGoesOnServing) {
     const GoalResult result = result_of(bad.goal_id());
 
     EXPECT_FALSE(result.success());
-    EXPECT_EQ(result.ending(), GoalResult_Constants::BROKEN);
+    EXPECT_EQ(result.ending(), GoalResult_Constants::INVALID);
     EXPECT_THAT(result.error(), HasSubstr(field));
     EXPECT_EQ(result.report(), "");
   }

@@ -365,23 +365,30 @@ std::optional<std::string> definition_of(const std::string& type) {
   return found->second;
 }
 
-std::optional<std::string> earlier_definition_of(const std::string& type) {
-  static const std::map<std::string, std::vector<std::string>> kAppended{
-      {"jostle_msgs/msg/Feedback", {"float64 idle"}},
-      {"jostle_msgs/msg/GoalResult", {"uint8 ending"}},
-      {"jostle_msgs/msg/Observation", {"float64 idle"}},
-      {"jostle_msgs/msg/Plan", {"float64 deviation", "bool while_acting"}},
-      {"jostle_msgs/msg/RobotStatus", {"float64[] limits"}},
-      {"jostle_msgs/msg/WorkerHeartbeat", {"uint64 refused"}}};
+std::vector<std::string> earlier_definitions_of(const std::string& type) {
+  using Fields = std::vector<std::string>;
+  static const std::map<std::string, std::vector<Fields>> kAppended{
+      // at one time each, newest first
+      {"jostle_msgs/msg/Feedback", {{"float64 idle"}}},
+      {"jostle_msgs/msg/GoalResult", {{"uint8 ending"}}},
+      {"jostle_msgs/msg/ObjectStates", {{"string scene"}}},
+      {"jostle_msgs/msg/Observation", {{"float64 idle"}}},
+      {"jostle_msgs/msg/Plan", {{"float64 deviation", "bool while_acting"}}},
+      {"jostle_msgs/msg/RobotStatus", {{"string scene"}, {"uint8 error_code"}, {"float64[] limits"}}},
+      {"jostle_msgs/msg/WorkerHeartbeat", {{"uint64 refused"}}}};
+  std::vector<std::string> earlier;
   const auto appended = kAppended.find(type);
   std::optional<std::string> definition = definition_of(type);
-  if (appended == kAppended.end() || !definition) return {};
-  for (const std::string& field : appended->second) {
-    const std::size_t line = definition->find(field);
-    if (line == std::string::npos) return {};
-    definition->erase(line, definition->find('\n', line) + 1 - line);
+  if (appended == kAppended.end() || !definition) return earlier;
+  for (const Fields& fields : appended->second) {
+    for (const std::string& field : fields) {
+      const std::size_t line = definition->find(field);
+      if (line == std::string::npos) return earlier;
+      definition->erase(line, definition->find('\n', line) + 1 - line);
+    }
+    earlier.push_back(*definition);
   }
-  return definition;
+  return earlier;
 }
 
 std::vector<std::string> known_types() {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "idl/types/result.hpp"
 
@@ -20,9 +21,9 @@ namespace jostle::bags {
 /// nothing for other types.
 std::optional<std::string> definition_of(const std::string& type);
 
-/// Returns the definition without the fields that were appended since bags were first recorded, for old bags of our
-/// recorder in rosbag2's storage, which bring no definitions. Nothing if none was appended.
-std::optional<std::string> earlier_definition_of(const std::string& type);
+/// Returns the definitions that a type had before fields were appended, newest first, for old bags of our recorder in
+/// rosbag2's storage, which bring no definitions. Empty if none was appended since bags were first recorded.
+std::vector<std::string> earlier_definitions_of(const std::string& type);
 
 /// Returns the ROS 2 name of a type that is written in another way: pkg/Name or pkg::msg::dds_::Name_ for
 /// pkg/msg/Name. Another text stays what it is.

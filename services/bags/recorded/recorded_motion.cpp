@@ -30,6 +30,10 @@ std::vector<int> topics_of_type(const BagInfo& info, const std::string& type) {
   return topics;
 }
 
+// What was appended since there are bags, with what aligns it.
+constexpr std::size_t kSceneBytes = 7;                     // its length
+constexpr std::size_t kStatusBytes = 7 + 4 + kSceneBytes;  // limits, error_code, scene
+
 // `unreadable`: counts states that are no longer, or not yet, what their type says.
 Result<std::vector<Moment>> follow_states(BagReader& reader, const RecordedRun& run, const StateLayout& layout,
                                           std::uint64_t& unreadable) {
@@ -46,7 +50,7 @@ Result<std::vector<Moment>> follow_states(BagReader& reader, const RecordedRun& 
     if (!*message_result || (*message_result)->log_time > run.end) return moments;
     const Message& message = **message_result;
     if (std::ranges::find(objects_topics, message.topic) != objects_topics.end()) {
-      auto states_result = wire::from_cdr<ObjectStates>(message.data);
+      auto states_result = wire::from_cdr_or_earlier<ObjectStates>(message.data, kSceneBytes, [](ObjectStates&) {});
       if (!states_result) {
         ++unreadable;
         continue;
@@ -56,7 +60,7 @@ Result<std::vector<Moment>> follow_states(BagReader& reader, const RecordedRun& 
       objects = std::move(readings_result).value();
       continue;
     }
-    auto status_result = wire::from_cdr<RobotStatus>(message.data);
+    auto status_result = wire::from_cdr_or_earlier<RobotStatus>(message.data, kStatusBytes, [](RobotStatus&) {});
     if (!status_result) {
       ++unreadable;
       continue;

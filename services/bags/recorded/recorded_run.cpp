@@ -15,27 +15,13 @@ using jostle_msgs::msg::Observation;
 using jostle_msgs::msg::Plan;
 using jostle_msgs::msg::TaskRun;
 
-// Reads a T as it is now, or as it was before fields were appended, of at most so many bytes with what aligns them: the
-// old layout with zeros behind it is the new one. `complete` gives them their values.
-template <class T, class Complete>
-Result<T> from_cdr_or_earlier(std::span<const std::byte> data, std::size_t appended, const Complete& complete) {
-  auto result = wire::from_cdr<T>(data);
-  if (result) return result;
-  std::vector<std::byte> longer(data.begin(), data.end());
-  longer.resize(longer.size() + appended);
-  auto earlier_result = wire::from_cdr<T>(longer);
-  if (!earlier_result) return result;
-  complete(*earlier_result);
-  return earlier_result;
-}
-
 Result<Observation> observation_from_cdr(std::span<const std::byte> data) {
-  return from_cdr_or_earlier<Observation>(data, 15, [](Observation& seen) { seen.idle(0.0); });
+  return wire::from_cdr_or_earlier<Observation>(data, 15, [](Observation& seen) { seen.idle(0.0); });
 }
 
 // Before there were plans that were made while acting.
 Result<Plan> plan_from_cdr(std::span<const std::byte> data) {
-  return from_cdr_or_earlier<Plan>(data, 16, [](Plan& plan) {
+  return wire::from_cdr_or_earlier<Plan>(data, 16, [](Plan& plan) {
     plan.deviation(-1.0);
     plan.while_acting(false);
   });
@@ -175,13 +161,13 @@ class Collector {
 }  // namespace
 
 Result<GoalResult> result_from_cdr(std::span<const std::byte> data) {
-  return from_cdr_or_earlier<GoalResult>(data, 1, [](GoalResult&) {});
+  return wire::from_cdr_or_earlier<GoalResult>(data, 1, [](GoalResult&) {});
 }
 
 planners::Ending ending_of(const GoalResult& result) {
   using planners::Ending;
   const auto ending = static_cast<Ending>(result.ending());
-  if (ending > Ending::kUnknown && ending <= Ending::kRefused) return ending;
+  if (ending > Ending::kUnknown && ending <= Ending::kInvalid) return ending;
   if (result.reason() == "cancelled") return Ending::kCancelled;
   if (result.reason() == "refused") return Ending::kRefused;
   if (!result.error().empty()) return Ending::kBroken;

@@ -30,11 +30,10 @@ Decoders::Decoders(const BagInfo& info, const MessageFiles& messages) {
     auto decoder_result = Decoder::create(type, *definition);
     if (decoder_result) {
       decoders_.back().emplace(std::move(*decoder_result));
-      const auto earlier = brings_own ? std::nullopt : earlier_definition_of(type);
-      if (earlier) {
-        if (auto earlier_result = Decoder::create(topic.topic.type, *earlier)) {
-          earlier_.back().emplace(std::move(*earlier_result));
-        }
+      if (brings_own) continue;
+      for (const std::string& earlier : earlier_definitions_of(type)) {
+        auto earlier_result = Decoder::create(topic.topic.type, earlier);
+        if (earlier_result) earlier_.back().push_back(std::move(*earlier_result));
       }
     } else {
       reasons_.back() = fmt::format("{}: {}", topic.topic.name, decoder_result.error().message);
@@ -46,8 +45,8 @@ Result<nlohmann::ordered_json> Decoders::decode(const Message& message) const {
   const auto topic = static_cast<std::size_t>(message.topic);
   auto json_result = decoders_.at(topic)->decode(message.data);
   if (json_result) return json_result;
-  if (earlier_.at(topic)) {
-    if (auto earlier_result = earlier_.at(topic)->decode(message.data)) return earlier_result;
+  for (const Decoder& earlier : earlier_.at(topic)) {
+    if (auto earlier_result = earlier.decode(message.data)) return earlier_result;
   }
   return Error{json_result.error().code, fmt::format("{}: message of log time {}: {}", names_[topic], message.log_time,
                                                      json_result.error().message)};

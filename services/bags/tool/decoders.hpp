@@ -28,7 +28,7 @@ class Decoders {
  private:
   std::vector<std::string> names_, reasons_;
   std::vector<std::optional<Decoder>> decoders_;
-  std::vector<std::optional<Decoder>> earlier_;  // for bags from before a field was appended
+  std::vector<std::vector<Decoder>> earlier_;  // for bags from before fields were appended
 };
 
 }  // namespace jostle::bags

@@ -63,7 +63,8 @@ static_assert(endings::UNKNOWN == static_cast<int>(Ending::kUnknown) &&
               endings::TIMED_OUT == static_cast<int>(Ending::kTimedOut) &&
               endings::CANCELLED == static_cast<int>(Ending::kCancelled) &&
               endings::BROKEN == static_cast<int>(Ending::kBroken) &&
-              endings::REFUSED == static_cast<int>(Ending::kRefused));
+              endings::REFUSED == static_cast<int>(Ending::kRefused) &&
+              endings::INVALID == static_cast<int>(Ending::kInvalid));
 
 // What they did meanwhile; without those that did nothing.
 Shares since(const Shares& before, Shares now) {
@@ -248,8 +249,13 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
                         : Result<Task>(ok.error());
   // These and the task end after the answer: taking endpoints and worlds down takes its time, and somebody waits.
   std::optional<Link> link;
-  const Performance done = task_result ? perform(goal, *task_result, link.emplace(participant_), cancelled)
-                                       : Performance{.outcome = {}, .seen = {}, .ended = task_result.error()};
+  Performance done;
+  if (task_result) {
+    link.emplace(participant_, world::WorldClientOptions{.scene = scene_hash(task_result->execution_scene())});
+    done = perform(goal, *task_result, *link, cancelled);
+  } else {
+    done.ended = task_result.error();
+  }
   if (done.outcome) {
     result.ending(on_the_wire(done.outcome->ending));
     result.success(done.outcome->success);
@@ -259,9 +265,13 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   }
   if (!done.ended) {
     const Error& error = done.ended.error();
-    const bool was_cancelled = error.code == Code::kCancelled;
-    result.ending(on_the_wire(was_cancelled ? planners::Ending::kCancelled : planners::Ending::kBroken));
-    result.reason(was_cancelled ? "cancelled" : "the system failed");
+    const bool is_bad = task_result ? done.seen.empty() && error.code == Code::kUnknownWorld
+                                    : common::exit_code_of(error) == common::kExitUsage;
+    const Ending ending = error.code == Code::kCancelled ? Ending::kCancelled
+                          : is_bad                       ? Ending::kInvalid
+                                                         : Ending::kBroken;
+    result.ending(on_the_wire(ending));
+    result.reason(ending == Ending::kBroken ? "the system failed" : to_string(ending));
     result.error(common::shown(error.message, limits::kShownError));
   }
   refuser = {};  // whoever asks once he has heard the result is served

@@ -72,7 +72,8 @@ class Coordinator {
 
   // The world of one goal, as the wire shows it.
   struct Link {
-    explicit Link(const wire::Participant& participant) : robot(participant), objects(participant, robot) {}
+    Link(const wire::Participant& participant, const world::WorldClientOptions& options)
+        : robot(participant, options), objects(participant, robot, options) {}
     world::RobotClient robot;
     world::ObjectsClient objects;
   };

@@ -32,6 +32,20 @@ Result<T> from_cdr(std::span<const std::byte> data) {
   }
 }
 
+/// Reads a T as it is now, or as it was before fields were appended, of at most so many bytes with what aligns them:
+/// the old layout with zeros behind it is the new one. `complete` gives the fields of an old one their values.
+template <class T, class Complete>
+Result<T> from_cdr_or_earlier(std::span<const std::byte> data, std::size_t appended, const Complete& complete) {
+  auto result = from_cdr<T>(data);
+  if (result) return result;
+  std::vector<std::byte> longer(data.begin(), data.end());
+  longer.resize(longer.size() + appended);
+  auto earlier_result = from_cdr<T>(longer);
+  if (!earlier_result) return result;
+  complete(*earlier_result);
+  return earlier_result;
+}
+
 template <class T>
 std::vector<std::byte> to_cdr(const T& message) {
   eprosima::fastcdr::FastBuffer buffer;

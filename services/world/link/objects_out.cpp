@@ -13,15 +13,17 @@ namespace natnet = perception::natnet;
 
 }  // namespace
 
-ObjectTopics::ObjectTopics(const wire::Participant& participant, std::chrono::milliseconds pause)
-    : pause_(pause),
+ObjectTopics::ObjectTopics(const wire::Participant& participant, const Hash& scene, std::chrono::milliseconds pause)
+    : scene_(scene.empty() ? "" : to_string(scene)),
+      pause_(pause),
       states_(participant, wire::topics::kObjectStates),
       poses_(participant, wire::topics::kObjectPoses),
       transforms_(participant, wire::topics::kTransforms) {}
 
 // States: when one is lost, the next one follows soon and says as much.
 void ObjectTopics::tell(const std::vector<perception::ObjectReading>& objects, double time) {
-  const auto message = to_message(objects, time);
+  auto message = to_message(objects, time);
+  message.scene(scene_);
   (void)states_.write(message);
   const auto now = steady_clock::now();
   if (now < next_) return;

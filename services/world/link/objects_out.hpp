@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "idl/types/hash.hpp"
 #include "idl/types/state.hpp"
 #include "perception/api/object_source.hpp"
 #include "perception/natnet/server.hpp"
@@ -31,11 +32,13 @@ class ObjectsOut {
 /// Publishes states, and in standard forms poses and transforms.
 class ObjectTopics final : public ObjectsOut {
  public:
+  /// `scene`: scene_hash() of the simulated scene that they are of; empty: of a real world.
   /// `pause`: between two messages of the standard forms, by the wall clock.
-  explicit ObjectTopics(const wire::Participant& participant, std::chrono::milliseconds pause = {});
+  ObjectTopics(const wire::Participant& participant, const Hash& scene, std::chrono::milliseconds pause = {});
   void tell(const std::vector<perception::ObjectReading>& objects, double time) override;
 
  private:
+  const std::string scene_;
   const std::chrono::milliseconds pause_;
   std::chrono::steady_clock::time_point next_{};
   TransformPace pace_;

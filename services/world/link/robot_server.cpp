@@ -21,6 +21,7 @@ constexpr std::size_t kPastEpochs = 64;    // remembered, for commands that are 
 
 RobotServer::RobotServer(const wire::Participant& participant, Body& body)
     : body_(body),
+      scene_(body.scene()),
       limits_(body.limits()),
       status_(participant, wire::topics::kRobotStatus),
       commands_(participant, wire::topics::kRobotCommand, kCommandQueue) {}
@@ -247,6 +248,7 @@ void RobotServer::publish() {
   status.q(reading.q);
   status.v(reading.v);
   status.limits(limits_);
+  status.scene(scene_);
   // A state: when one is lost, the next one follows soon and says as much. It comes last: who sees
   // a command finished finds its objects sent.
   (void)status_.write(status);

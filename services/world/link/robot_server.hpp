@@ -29,6 +29,9 @@ class Body {
  public:
   virtual ~Body() = default;
 
+  /// Returns scene_hash() of the scene that it simulates, as text; nothing of a real world.
+  virtual std::string scene() const { return {}; }
+
   /// Returns the largest speeds of the axes, m/s or rad/s.
   virtual std::vector<double> limits() const = 0;
 
@@ -103,6 +106,7 @@ class RobotServer {
   void publish_when_due();
 
   Body& body_;
+  const std::string scene_;           // see Body
   const std::vector<double> limits_;  // largest speeds of the axes, m/s or rad/s
   std::deque<Letter> waiting_;        // the commander's, came while an action was at work
   std::deque<Newcomer> newcomers_;    // the newest command of each

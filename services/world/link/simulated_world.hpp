@@ -33,6 +33,7 @@ class SimulatedWorld final : public Body {
   SimulatedWorld(const wire::Participant& participant, const physics_pool::WorldPtr& world,
                  const SimulatedWorldOptions& options, ObjectsOut& objects);
 
+  std::string scene() const override { return to_string(world_.world().hash()); }
   std::vector<double> limits() const override;
   Result<void> begin(std::span<const double> u, double duration) override;
   bool is_over() const override { return steps_left_ <= 0; }

@@ -24,6 +24,17 @@ Error silent(const char* who, const std::string& topic, std::chrono::millisecond
                               who, topic, time.count() / 1e3)};
 }
 
+// `simulated`: as the world says it; empty for a real one.
+Result<void> check_scene(const std::string& topic, const std::string& simulated, const Hash& wanted) {
+  if (simulated.empty() || wanted.empty() || simulated == to_string(wanted)) return {};
+  return Error{
+      Code::kUnknownWorld,
+      fmt::format("{}: got a world simulated in the scene of hash {}, wanted {}: the plan would be made for other "
+                  "things than are there; give the scene file that the world was started with (`jostle scene "
+                  "check FILE` prints its hash), or start the world with this one",
+                  topic, common::shown(simulated, 32), to_string(wanted))};
+}
+
 }  // namespace
 
 RobotClient::RobotClient(const wire::Participant& participant, const WorldClientOptions& options)
@@ -43,13 +54,17 @@ bool RobotClient::is_robot(std::uint64_t writer) {
 Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::chrono::milliseconds patience,
                                                                std::stop_token stop) {
   const auto deadline = steady_clock::now() + patience;
-  std::string problem;
+  std::optional<Error> problem;
+  const auto reject = [&](Error error) {
+    problem = std::move(error);
+    rejected_.warn("{}; rejected", problem->message);
+  };
   for (;;) {
     auto letter = status_.take_letter(deadline, stop);
     if (stop.stop_requested()) return Error{Code::kCancelled, "robot: stopped on request"};
     if (!letter) {
-      if (problem.empty()) return silent("robot", wire::topics::kRobotStatus.name, patience, heard_);
-      return Error{Code::kInvalidArgument, problem + "; no good status followed"};
+      if (!problem) return silent("robot", wire::topics::kRobotStatus.name, patience, heard_);
+      return Error{problem->code, problem->message + "; no good status followed"};
     }
     jostle_msgs::msg::RobotStatus& status = letter->sample;
     if (!is_robot(letter->writer)) {
@@ -57,9 +72,13 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::chrono::mill
                     wire::topics::kRobotStatus.name, letter->writer, *robot_);
       continue;
     }
+    if (auto ok = check_scene(wire::topics::kRobotStatus.name, status.scene(), options_.scene); !ok) {
+      if (robot_ == letter->writer) return ok.error();
+      reject(ok.error());  // it may be a stranger's
+      continue;
+    }
     if (auto reading_result = from_message(status); !reading_result) {
-      problem = wire::topics::kRobotStatus.name + ": " + reading_result.error().message;
-      rejected_.warn("{}; rejected", problem);
+      reject({Code::kInvalidArgument, wire::topics::kRobotStatus.name + ": " + reading_result.error().message});
       continue;
     }
     if (known_ && status.epoch() != epoch_) {
@@ -193,17 +212,25 @@ ObjectsClient::ObjectsClient(const wire::Participant& participant, const RobotCl
 Result<std::vector<perception::ObjectReading>> ObjectsClient::read() {
   const auto patience = time_ < 0 ? options_.start : options_.silence;
   const auto deadline = steady_clock::now() + patience;
-  std::string problem;
+  std::optional<Error> problem;
+  const auto reject = [&](Error error) {
+    problem = std::move(error);
+    rejected_.warn("{}; rejected", problem->message);
+  };
   constexpr double kSameTime = 1e-6;  // s, rounding of stamps
   while (newest_.empty() || time_ < robot_.time() - kSameTime) {
     auto letter = states_.take_letter(deadline);
     if (!letter) {
-      if (problem.empty()) return silent("objects", wire::topics::kObjectStates.name, patience, time_ >= 0);
-      return Error{Code::kInvalidArgument, problem + "; no good measurement followed"};
+      if (!problem) return silent("objects", wire::topics::kObjectStates.name, patience, time_ >= 0);
+      return Error{problem->code, problem->message + "; no good measurement followed"};
     }
     if (const auto robot = robot_.participant(); robot && letter->writer != *robot && states_.hears(*robot)) {
       foreign_.warn("{}: a measurement of participant {:016x} was dropped: the robot's world is participant {:016x}",
                     wire::topics::kObjectStates.name, letter->writer, *robot);
+      continue;
+    }
+    if (auto ok = check_scene(wire::topics::kObjectStates.name, letter->sample.scene(), options_.scene); !ok) {
+      reject(ok.error());
       continue;
     }
     auto readings_result = from_message(letter->sample);
@@ -211,8 +238,7 @@ Result<std::vector<perception::ObjectReading>> ObjectsClient::read() {
       newest_ = std::move(readings_result).value();
       time_ = seconds(letter->sample.header());
     } else {
-      problem = wire::topics::kObjectStates.name + ": " + readings_result.error().message;
-      rejected_.warn("{}; rejected", problem);
+      reject({Code::kInvalidArgument, wire::topics::kObjectStates.name + ": " + readings_result.error().message});
     }
   }
   return newest_;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "idl/types/hash.hpp"
 #include "perception/api/object_source.hpp"
 #include "robot_bridge/api/robot.hpp"
 #include "services/common/process/trouble.hpp"
@@ -21,6 +22,9 @@
 namespace jostle::world {
 
 struct WorldClientOptions {
+  /// scene_hash() of the scene that plans are made for. Of a world that is simulated, it must be this one; a real one
+  /// says of none. Empty: any will do.
+  Hash scene;
   /// A robot or a world that something waits for, and that is not heard for this long, is reported as gone. Shorter,
   /// and one that is only slow, on a machine whose workers take all cores, is taken for dead.
   std::chrono::milliseconds silence{5000};
@@ -35,7 +39,7 @@ struct WorldClientOptions {
 /// Bad statuses are counted, reported and skipped; only if nothing good follows
 /// are they an error. The robot is the participant that speaks and reads our commands; what others say
 /// of it is dropped and counted. That it obeys another commander, or does not take a command, is an
-/// error, too.
+/// error, too. So is a world of another scene: kUnknownWorld.
 class RobotClient final : public robot_bridge::Robot {
  public:
   RobotClient(const wire::Participant& participant, const WorldClientOptions& options = {});
@@ -89,7 +93,8 @@ class RobotClient final : public robot_bridge::Robot {
 /// Reads object states from `rt/objects/states`, never older than the robot's newest
 /// status, so that both describe one moment. Where the robot's participant speaks of objects,
 /// as a simulated world does, nobody else is listened to. Bad measurements are counted,
-/// reported and skipped; only if nothing good follows are they an error.
+/// reported and skipped; only if nothing good follows are they an error. Those of another scene are an error,
+/// kUnknownWorld.
 class ObjectsClient final : public perception::ObjectSource {
  public:
   ObjectsClient(const wire::Participant& participant, const RobotClient& robot, const WorldClientOptions& options = {});

@@ -22,7 +22,7 @@ constexpr double kStartedAgain = 5.0;                            // s; no measur
 
 Sight::Sight(const wire::Participant& participant, std::optional<physics_pool::Scene> scene)
     : scene_(std::move(scene)),
-      topics_(participant, kStandardForms),
+      topics_(participant, {}, kStandardForms),
       detections_(participant, wire::topics::kObjectDetections) {
   if (!scene_) return;
   for (const physics_pool::SceneObject& object : scene_->objects) seen_[object.name] = Clock::now();

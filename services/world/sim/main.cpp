@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
       if (!tags_result) return fail(tags_result.error());
       objects = std::make_unique<CameraOut>(*participant_result, *scene_result, std::move(tags_result).value(), seed);
     } else if (mocap.empty()) {
-      objects = std::make_unique<ObjectTopics>(*participant_result);
+      objects = std::make_unique<ObjectTopics>(*participant_result, (*world_result)->hash());
     } else {
       auto cameras_result = MocapCameras::start(mocap, physics_pool::layout_of(*scene_result), faults);
       if (!cameras_result) return fail(cameras_result.error());

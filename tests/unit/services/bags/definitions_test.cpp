@@ -14,8 +14,11 @@ namespace {
 
 using bags::Decoder;
 using bags::definition_of;
+using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::StartsWith;
 
@@ -146,16 +149,21 @@ TEST(DefinitionOf, ResultsSaysWhatItsNumbersMean) {
 
 TEST(EarlierDefinitionOf, DecodesWhatWasRecordedBeforeAFieldWasAppended) {
   const std::string type = "jostle_msgs/msg/GoalResult";
-  const auto earlier = taken(Decoder::create(type, bags::earlier_definition_of(type).value()));
+  const auto earlier = taken(Decoder::create(type, bags::earlier_definitions_of(type).at(0)));
   const Bytes old = Cdr().text("goal").add(std::uint8_t{1}).text("target grasped").text("").text("{}").bytes();
   EXPECT_FALSE(decoder(type).decode(old));
   EXPECT_EQ(taken(earlier.decode(old)).dump(),
             R"({"goal_id":"goal","success":true,"reason":"target grasped","error":"","report":"{}"})");
-  EXPECT_THAT(bags::earlier_definition_of("jostle_msgs/msg/WorkerHeartbeat").value(),
+  EXPECT_THAT(bags::earlier_definitions_of("jostle_msgs/msg/WorkerHeartbeat").at(0),
               AllOf(HasSubstr("ClientLoad[] clients"), Not(HasSubstr("refused"))));
-  EXPECT_THAT(bags::earlier_definition_of("jostle_msgs/msg/Plan").value(),
+  EXPECT_THAT(bags::earlier_definitions_of("jostle_msgs/msg/Plan").at(0),
               AllOf(HasSubstr("uint64 rollouts\n"), Not(HasSubstr("deviation")), Not(HasSubstr("while_acting"))));
-  EXPECT_FALSE(bags::earlier_definition_of("jostle_msgs/msg/Goal"));
+  EXPECT_THAT(
+      bags::earlier_definitions_of("jostle_msgs/msg/RobotStatus"),
+      ElementsAre(AllOf(HasSubstr("float64[] limits"), HasSubstr("uint8 error_code"), Not(HasSubstr("string scene"))),
+                  AllOf(HasSubstr("float64[] limits"), Not(HasSubstr("uint8 error_code"))),
+                  AllOf(HasSubstr("float64[] v"), Not(HasSubstr("float64[] limits")))));
+  EXPECT_THAT(bags::earlier_definitions_of("jostle_msgs/msg/Goal"), IsEmpty());
 }
 
 TEST(DecoderTest, DecodesEveryKindOfFieldInBothByteOrders) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "idl/text/yaml_fields.hpp"
 #include "services/common/process/files.hpp"
@@ -149,6 +150,19 @@ std::string without_line(std::string message, const std::string& origin) {
   return after == message.npos ? message : message.replace(origin.size(), after + 1 - origin.size(), "");
 }
 
+// The files' lists are for x, y, rotation and the hand. Makes them those of a robot's own axes: one that a file does
+// not name is held still.
+void fit_axes(const physics_pool::RobotModel& model, const physics_pool::PlanarRobot& planar,
+              planners::PbstoOptions& planner) {
+  const std::vector<double> sigma = std::exchange(planner.sigma, {}), limit = std::exchange(planner.limit, {});
+  for (int i = 0; i < static_cast<int>(model.axes.size()); ++i) {
+    const std::size_t named = i == planar.x ? 0u : i == planar.y ? 1u : i == planar.rotation ? 2u : 3u;
+    const double most = model.axes[static_cast<std::size_t>(i)].limit;
+    planner.sigma.push_back(named < sigma.size() ? sigma[named] : 0.0);
+    planner.limit.push_back(named < limit.size() ? std::min(limit[named], most) : most);
+  }
+}
+
 }  // namespace
 
 Result<Parameters> parse_parameters(std::string_view text, const std::string& origin, const Parameters& base) {
@@ -177,8 +191,12 @@ Result<Parameters> with_settings(const Parameters& base, const std::vector<std::
 
 Result<Parameters> standard_parameters(const planners::ControllerKind& controller, const physics_pool::Scene* scene) {
   auto parameters_result = load_parameters(common::data_file(controller.parameters));
-  if (!parameters_result || !controller.arm_parameters || !scene || as_planar(scene->robot.model))
+  if (!parameters_result || !scene) return parameters_result;
+  if (const auto planar = as_planar(scene->robot.model)) {
+    fit_axes(scene->robot.model, *planar, parameters_result->planner);
     return parameters_result;
+  }
+  if (!controller.arm_parameters) return parameters_result;
   return load_parameters(common::data_file(controller.arm_parameters), *parameters_result);
 }
 
@@ -215,7 +233,7 @@ Result<void> check_fit(const Parameters& parameters, const physics_pool::Scene& 
   std::vector<std::string> names;
   for (const physics_pool::Axis& axis : axes) names.push_back(axis.name);
   return invalid("parameters: planner.sigma", fmt::format("{} numbers", parameters.planner.sigma.size()),
-                 fmt::format("{} for the robot '{}': {}; experiments/ has files for grasping and for pushing",
+                 fmt::format("{} for the robot '{}': {}; without planner.sigma and planner.limit it has its own",
                              axes.size(), scene.robot.model.name, fmt::join(names, ", ")));
 }
 

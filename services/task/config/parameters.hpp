@@ -36,8 +36,8 @@ Result<Parameters> load_parameters(const std::filesystem::path& file, const Para
 Result<Parameters> with_settings(const Parameters& base, const std::vector<std::string>& settings);
 
 /// Returns what a controller runs with where nobody says anything else: its own parameter file, and what the one for
-/// arms changes of it if the scene has an arm. `scene`: null for a robot that moves in the plane. Errors   those of
-/// load_parameters
+/// arms changes of it if the scene has an arm. planner.sigma and planner.limit are of the axes that the scene's robot
+/// has. `scene`: null for the planar gripper. Errors   those of load_parameters
 Result<Parameters> standard_parameters(const planners::ControllerKind& controller,
                                        const physics_pool::Scene* scene = nullptr);
 

@@ -7,8 +7,10 @@
 #include <fstream>
 #include <set>
 
+#include "planners/controllers/catalogue.hpp"
 #include "services/task/config/parameter_keys.hpp"
 #include "tests/support/costs.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace jostle::task {
 namespace {
@@ -155,6 +157,25 @@ TEST(Parameters, OfPushingAreThoseOfTheCode) {
   EXPECT_EQ(mpc.max_actions, defaults.max_actions);
   EXPECT_EQ(mpc.straight_speed, defaults.straight_speed);
   EXPECT_EQ(result->limits.timeout, planners::RunLimits{}.timeout);
+}
+
+// Controllers' files are for one robot, and others do their tasks, too.
+TEST(StandardParameters, AreOfTheAxesThatARobotHas) {
+  physics_pool::Scene pusher = tests::push_ahead(), gripper = tests::push_ahead();
+  gripper.robot.model = tests::three_objects().robot.model;
+  for (const planners::ControllerKind* kind : planners::controllers()) {
+    for (const physics_pool::Scene& scene : {pusher, gripper}) {
+      if (!kind->fits(scene)) continue;
+      const auto result = standard_parameters(*kind, &scene);
+      ASSERT_TRUE(result) << kind->name << ": " << result.error().message;
+      EXPECT_TRUE(check_fit(*result, scene)) << kind->name << " with " << scene.robot.model.name;
+    }
+  }
+  const auto adaptive = standard_parameters(**planners::find_controller("tampc", pusher), &pusher).value().planner;
+  EXPECT_EQ(adaptive.sigma, (std::vector<double>{0.02, 0.02}));
+  const auto mpc = standard_parameters(**planners::find_controller("mpc", gripper), &gripper).value().planner;
+  EXPECT_EQ(mpc.sigma, (std::vector<double>{0.01, 0.01, 0.0, 0.0}))
+      << "axes that the file does not name are held still";
 }
 
 struct Case {

@@ -32,4 +32,11 @@ std::string nearest(std::string_view word, const Words& known) {
   return found;
 }
 
+/// Returns "; did you mean WORD?" for the end of a complaint, or nothing.
+template <class Words>
+std::string did_you_mean(std::string_view word, const Words& known) {
+  const std::string meant = nearest(word, known);
+  return meant.empty() ? "" : "; did you mean " + meant + "?";
+}
+
 }  // namespace jostle

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "idl/text/nearest.hpp"
 #include "physics_pool/coarse/kinematic.hpp"
 #include "physics_pool/coarse/learned/learned_model.hpp"
 #include "physics_pool/coarse/quasi_static.hpp"
@@ -20,6 +22,7 @@ Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, 
                     scene.name, scene.robot.model.name)};
   }
   constexpr std::string_view kLearned = "learned:";
+  constexpr std::array kModels{"kinematic", "limit-surface", "planar", "learned"};
   if (name.starts_with(kLearned)) return load_learned_model(name.substr(kLearned.size()), scene);
   std::unique_ptr<CoarseModel> model;
   if (name == "kinematic") model = std::make_unique<KinematicModel>(scene);
@@ -29,7 +32,8 @@ Result<std::unique_ptr<CoarseModel>> make_coarse_model(const std::string& name, 
   if (name == "planar") model = std::make_unique<QuasiStaticModel>(scene, QuasiStaticOptions{});
   if (model) return model;
   return Error{Code::kInvalidArgument,
-               fmt::format("coarse model: got '{}', wanted kinematic, limit-surface, planar or learned:FILE", name)};
+               fmt::format("coarse model: got '{}', wanted kinematic, limit-surface, planar, learned or learned:FILE{}",
+                           name, did_you_mean(name, kModels))};
 }
 
 void to_planar(const StateLayout& layout, const State& x, std::span<double> planar) {

@@ -1,10 +1,14 @@
 #include "physics_pool/render/renderer.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
+#include "idl/text/nearest.hpp"
 #include "physics_pool/local/world.hpp"
 #include "physics_pool/render/canvas.hpp"
 #include "physics_pool/render/decoration.hpp"
@@ -27,11 +31,10 @@ struct DrawList : mjvScene {
 Result<mjvCamera> find_camera(const mjModel* model, const std::string& name) {
   const int id = mj_name2id(model, mjOBJ_CAMERA, name.c_str());
   if (id < 0) {
-    std::string known;
-    for (int i = 0; i < model->ncam; ++i) {
-      known += (i > 0 ? ", " : "") + std::string(mj_id2name(model, mjOBJ_CAMERA, i));
-    }
-    return Error{Code::kInvalidArgument, fmt::format("camera: got '{}', wanted one of: {}", name, known)};
+    std::vector<std::string> known;
+    for (int i = 0; i < model->ncam; ++i) known.emplace_back(mj_id2name(model, mjOBJ_CAMERA, i));
+    return Error{Code::kInvalidArgument, fmt::format("camera: got '{}', wanted one of: {}{}", name,
+                                                     fmt::join(known, ", "), did_you_mean(name, known))};
   }
   mjvCamera camera;
   mjv_defaultCamera(&camera);

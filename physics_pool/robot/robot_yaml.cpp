@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "idl/files/files.hpp"
+#include "idl/text/nearest.hpp"
 #include "idl/text/yaml_fields.hpp"
 #include "physics_pool/robot/pose_text.hpp"
 
@@ -30,6 +31,14 @@ constexpr std::initializer_list<std::pair<const char*, GeomShape>> kShapes{{"box
                                                                            {"cylinder", GeomShape::kCylinder},
                                                                            {"sphere", GeomShape::kSphere},
                                                                            {"mesh", GeomShape::kMesh}};
+
+std::string_view stem_of(std::string_view file) { return file.substr(0, file.find('.')); }
+
+std::vector<std::string> builtin_robots() {
+  std::vector<std::string> names;
+  for (const auto& [file, text] : embedded::kRobots) names.emplace_back(stem_of(file));
+  return names;
+}
 
 template <class E>
 const char* word_of(std::initializer_list<std::pair<const char*, E>> words, E value) {
@@ -54,7 +63,8 @@ int index_of(const std::vector<T>& things, const std::string& name, const Fields
     if (things[i].name == name) return static_cast<int>(i);
     known.push_back(things[i].name);
   }
-  fields.refuse(key, fmt::format("got '{}', wanted one of: {}", name, fmt::join(known, ", ")));
+  fields.refuse(key,
+                fmt::format("got '{}', wanted one of: {}{}", name, fmt::join(known, ", "), did_you_mean(name, known)));
 }
 
 Joint read_joint(Fields& in) {
@@ -271,13 +281,11 @@ std::string robot_text(const RobotModel& model, int indent) {
 }
 
 Result<RobotModel> builtin_robot(std::string_view name) {
-  std::vector<std::string_view> known;
   for (const auto& [file, text] : embedded::kRobots) {
-    const std::string_view stem = file.substr(0, file.find('.'));
-    if (stem == name) return parse_robot(text, fmt::format("models/{}", file));
-    known.push_back(stem);
+    if (stem_of(file) == name) return parse_robot(text, fmt::format("models/{}", file));
   }
-  return Error{Code::kNotFound, fmt::format("got '{}', wanted {}, or a file", name, fmt::join(known, ", "))};
+  return Error{Code::kNotFound, fmt::format("got '{}', wanted {}, or a file{}", name, fmt::join(builtin_robots(), ", "),
+                                            did_you_mean(name, builtin_robots()))};
 }
 
 RobotPath robot_path(const fs::path& base) {
@@ -304,10 +312,12 @@ Result<RobotModel> find_robot(const std::string& name, const RobotPath& path) {
     }
     tried.push_back(folder.string());
   }
-  return Error{Code::kNotFound,
-               fmt::format("got '{}', wanted planar_gripper, pusher, or a file of that name (also with .yaml, "
-                           ".urdf or /robot.yaml) in: {}; JOSTLE_MODELS adds folders",
-                           name, fmt::join(tried, ", "))};
+  return Error{
+      Code::kNotFound,
+      fmt::format("got '{}', wanted {}, or a file of that name (also with .yaml, .urdf or /robot.yaml) in: {}; "
+                  "JOSTLE_MODELS adds folders{}",
+                  name, fmt::join(builtin_robots(), ", "), fmt::join(tried, ", "),
+                  did_you_mean(name, builtin_robots()))};
 }
 
 }  // namespace jostle::physics_pool

@@ -9,8 +9,10 @@
 #include <mutex>
 #include <numbers>
 #include <optional>
+#include <ranges>
 #include <set>
 
+#include "idl/text/nearest.hpp"
 #include "physics_pool/robot/kinematics.hpp"
 #include "physics_pool/scene/outline.hpp"
 #include "physics_pool/scene/scene_problems.hpp"
@@ -335,13 +337,16 @@ class Inspection {
     if (!kind) {
       std::vector<std::string> known;
       for (const TaskKind* k : task_kinds()) known.emplace_back(k->name);
-      add({"task.kind", "task.kind"}, fmt::format("got '{}', wanted one of: {}", task.kind, fmt::join(known, ", ")));
+      add({"task.kind", "task.kind"}, fmt::format("got '{}', wanted one of: {}{}", task.kind, fmt::join(known, ", "),
+                                                  did_you_mean(task.kind, known)));
     } else if (is_robot_sound) {
       if (const std::string misfit = kind->misfit(scene_); !misfit.empty())
         add_relative({"task.kind", "task.kind"}, misfit);
     }
     if (scene_.target() < 0) {
-      add_relative({"task.target", "task.target"}, fmt::format("got '{}', wanted the name of an object", task.target));
+      add_relative({"task.target", "task.target"},
+                   fmt::format("got '{}', wanted the name of an object{}", task.target,
+                               did_you_mean(task.target, std::views::transform(scene_.objects, &SceneObject::name))));
     }
     if (kind && kind->has_goal) check_disc("task.goal", task.goal);
     if (task.obstacle) check_disc("task.obstacle", *task.obstacle);

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <ranges>
 #include <utility>
+
+#include "idl/text/nearest.hpp"
 
 namespace jostle::physics_pool {
 namespace {
@@ -19,7 +22,8 @@ Result<Uncertainty> parse_uncertainty(std::string_view word) {
   for (const auto& [name, level] : kLevels) {
     if (word == name) return level;
   }
-  return Error{Code::kInvalidArgument, fmt::format("uncertainty: got '{}', wanted none, low, medium or high", word)};
+  return Error{Code::kInvalidArgument, fmt::format("uncertainty: got '{}', wanted none, low, medium or high{}", word,
+                                                   did_you_mean(word, std::views::keys(kLevels)))};
 }
 
 const char* to_string(Uncertainty level) { return kLevels[static_cast<std::size_t>(level)].first; }

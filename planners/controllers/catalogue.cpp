@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "idl/text/nearest.hpp"
 #include "physics_pool/task/kinds.hpp"
 
 namespace jostle::planners {
@@ -169,8 +170,11 @@ Result<const ControllerKind*> find_controller(std::string_view name, const Scene
   const std::string wanted =
       fitting.empty()
           ? fmt::format("another task or robot: no controller can do it with the robot '{}'", scene.robot.model.name)
-          : fmt::format("{}", fmt::join(fitting, ", "));
-  return invalid("controller", name.empty() ? "none" : fmt::format("'{}' for a task to {}", name, scene.task.kind),
+          : fmt::format("{}{}", fmt::join(fitting, ", "), did_you_mean(name, fitting));
+  return invalid("controller",
+                 name.empty() ? "none"
+                              : fmt::format("'{}' for a task to {} with the robot '{}'", name, scene.task.kind,
+                                            scene.robot.model.name),
                  wanted);
 }
 

@@ -66,7 +66,7 @@ std::string controller_help();
 std::vector<std::string> controller_names();
 
 /// Finds a controller by its name, or the first that fits the scene where the name is empty.
-/// Error kInvalidArgument: "controller: got 'mpc' for a task to grasp, wanted or, nr".
+/// Error kInvalidArgument: "controller: got 'mpc' for a task to grasp with the robot 'planar_gripper', wanted or, nr".
 Result<const ControllerKind*> find_controller(std::string_view name, const physics_pool::Scene& scene);
 
 /// Adds a controller at the end, for programs that bring their own. Call it from one thread, before anything runs.

@@ -46,7 +46,7 @@ TEST_F(Extensions, AreInTheHelpAndTheListsOfErrors) {
   EXPECT_EQ(finish({"--help"}), 0);
   EXPECT_THAT(run->out(), HasSubstr("two-steps: plans once and acts twice"));
   EXPECT_EQ(finish({kArm, "--controller", "three-steps"}), 2);
-  EXPECT_THAT(run->err(), HasSubstr("--controller: got 'three-steps' for a task to reach, wanted two-steps"));
+  EXPECT_THAT(run->err(), HasSubstr("--controller: got 'three-steps' for a task to reach with the robot"));
 }
 
 }  // namespace

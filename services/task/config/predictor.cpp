@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <climits>
 #include <optional>
 #include <sstream>
 #include <vector>
 
+#include "idl/text/nearest.hpp"
 #include "idl/types/number.hpp"
 #include "services/common/process/files.hpp"
 
@@ -14,10 +16,11 @@ namespace jostle::task {
 namespace {
 
 Error unknown(const std::string& text) {
+  constexpr std::array kMethods{"fine", "coarse", "parareal"};
   return {Code::kInvalidArgument,
           fmt::format("predictor: got '{}', wanted fine, coarse[,MODEL], parareal:K[,MODEL][,split] or "
-                      "parareal:adaptive[,MODEL][,split]",
-                      text)};
+                      "parareal:adaptive[,MODEL][,split]{}",
+                      text, did_you_mean(text.substr(0, text.find_first_of(":,")), kMethods))};
 }
 
 std::vector<std::string> words_of(const std::string& text) {

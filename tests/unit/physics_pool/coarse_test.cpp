@@ -210,7 +210,7 @@ TEST(MakeCoarseModel, SaysWhatItWants) {
   const auto unknown = make_coarse_model("astrology", scene);
   ASSERT_FALSE(unknown);
   EXPECT_THAT(unknown.error().message,
-              HasSubstr("got 'astrology', wanted kinematic, limit-surface, planar or learned:FILE"));
+              HasSubstr("got 'astrology', wanted kinematic, limit-surface, planar, learned or learned:FILE"));
 
   Scene gripper = scene;
   gripper.robot = planar_gripper();

@@ -201,7 +201,9 @@ TEST_F(GraspingStudyRun, CommandLineChoosesSeedsLevelsAndControllers) {
   set_options(*sut, {"--levels", "absurd"});
   EXPECT_THAT(refusal(*sut), HasSubstr("--levels: "));
   set_options(*sut, {"--levels", "low", "--controllers", "psychic"});
-  EXPECT_THAT(refusal(*sut), HasSubstr("--controllers: got 'psychic' for a task to grasp, wanted or, nr"));
+  EXPECT_THAT(
+      refusal(*sut),
+      HasSubstr("--controllers: got 'psychic' for a task to grasp with the robot 'planar_gripper', wanted or, nr"));
   set_options(*sut, {"--controllers", "nr", "--seeds", "2-1"});
   EXPECT_THAT(refusal(*sut), HasSubstr("--seeds: got '2-1'"));
 }

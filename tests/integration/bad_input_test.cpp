@@ -107,7 +107,8 @@ TEST_F(BadInput, DomainWhosePortOfDiscoveryIsTakenIsRefusedWithPortAndRemedy) {
 
 TEST_F(BadInput, ArgumentsAreRefusedWithGotAndWanted) {
   expect_refused({easy, "--controller", "psychic"}, {"controller", "psychic", "or", "nr"});
-  expect_refused({easy, "--controller", "mpc"}, {"--controller", "got 'mpc' for a task to grasp", "wanted or, nr"});
+  expect_refused({easy, "--controller", "mpc"},
+                 {"--controller", "got 'mpc' for a task to grasp with the robot 'planar_gripper'", "wanted or, nr"});
   expect_refused({folder.write("push.yaml", physics_pool::to_yaml(push_ahead())), "--controller", "nr"},
                  {"--controller", "got 'nr' for a task to push", "wanted mpc"});
   expect_refused({easy, "--predictor", "oracle"}, {"--predictor", "got 'oracle'", "wanted fine, coarse"});
@@ -120,7 +121,27 @@ TEST_F(BadInput, ArgumentsAreRefusedWithGotAndWanted) {
   expect_refused({easy, "--pin", "--pool", "threads"}, {"--pin", "got --pool threads", "wanted dds"});
   expect_refused({easy, "--rate", "-1"}, {"rate", "-1"});
   expect_refused({easy, "--parameters", plain, "--domain", "999"}, {"999", "wanted"});
+  expect_refused({easy, "--view", "99999"}, {"--view", "got '99999'", "wanted a port, 0 to 65535"});
   expect_refused({}, {"scene"});
+}
+
+TEST_F(BadInput, MisspeltWordsAreToldWithTheOneThatWasMeant) {
+  expect_refused({easy, "--uncertainty", "mediun"}, {"did you mean medium?"});
+  expect_refused({easy, "--controller", "orr"}, {"did you mean or?"});
+  expect_refused({easy, "--predictor", "course"}, {"did you mean coarse?"});
+  expect_refused({easy, "--predictor", "coarse,kinematics"},
+                 {"wanted kinematic, limit-surface, planar, learned or", "did you mean kinematic?"});
+  expect_refused({scene_file([](physics_pool::Scene& s) { s.task.target = "targe"; })}, {"did you mean target?"});
+  const std::string scene = contents(easy);
+  const std::size_t at = scene.find("planar_gripper");
+  ASSERT_NE(at, std::string::npos);
+  expect_refused({folder.write("robot.yaml", scene.substr(0, at) + "planar_griper" + scene.substr(at + 14))},
+                 {"wanted planar_gripper, pusher, ur5_2f85", "did you mean planar_gripper?"});
+}
+
+TEST_F(BadInput, ArmIsRefusedForARobotThatItDoesNotMove) {
+  const std::string push = folder.write("push.yaml", physics_pool::to_yaml(push_ahead()));
+  expect_refused({push, "--arm", "ur-sim"}, {"--arm: scene", "got 'pusher', wanted planar_gripper"});
 }
 
 TEST_F(BadInput, WorkerRefusesCoresThatItMayNotUse) {

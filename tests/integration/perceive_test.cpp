@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/run_fixture.hpp"
@@ -10,6 +11,7 @@
 namespace jostle::tests {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -60,6 +62,45 @@ TEST_F(PerceiveByCamera, AnArmGraspsWhatRenderedPixelsShowAndReplaysBitEqual) {
   const auto replay = program("jostle_replay", {bag});
   EXPECT_EQ(replay->wait(kPatience), 0) << replay->out() << replay->err();
   EXPECT_THAT(replay->out(), HasSubstr("BIT-EQUAL"));
+}
+
+// What `jostle doctor` says of the eyes, by what it looked at.
+class DoctorOfEyes : public RunFixture {
+ protected:
+  void ask(const std::vector<std::string>& arguments) {
+    const auto doctor = program("jostle_doctor", arguments);
+    EXPECT_TRUE(doctor->wait(kPatience));
+    for (const nlohmann::json& check : nlohmann::json::parse(doctor->out(), nullptr, false))
+      said[check["name"]] =
+          fmt::format("{}: {}", check["verdict"].get<std::string>(), check["finding"].get<std::string>());
+  }
+
+  std::map<std::string, std::string> said;
+};
+
+TEST_F(DoctorOfEyes, NamesTheBodiesOfAMotionCapture) {
+  const std::string address = fmt::format("127.0.6.{}", domain + 1);
+  const auto world = program("jostle_sim", {easy, "--mocap", address, "--free-running"});
+  ask({"--json", "--mocap", address});
+  EXPECT_THAT(said["motion capture"], StartsWith("ok: frames come from " + address)) << world->err();
+  EXPECT_THAT(said["rigid bodies"], AllOf(StartsWith("ok: "), HasSubstr("target")));
+  EXPECT_THAT(said["frames"], HasSubstr("0 lost, 0 malformed"));
+}
+
+TEST_F(DoctorOfEyes, SaysThatNobodyIsThere) {
+  ask({"--json", "--mocap", fmt::format("127.0.6.{}", domain + 1)});
+  EXPECT_THAT(said["motion capture"], StartsWith("FAIL: "));
+  ask({"--json", "--camera", "camera"});
+  EXPECT_THAT(said["camera"], StartsWith("FAIL: no image on /camera/image_raw"));
+}
+
+TEST_F(DoctorOfEyes, NamesTheTagsThatACameraSees) {
+  const auto arm = program("jostle_ur_sim", {easy, "--camera", "--address", fmt::format("127.0.1.{}", domain + 1)});
+  ASSERT_TRUE(arm->says("ready", kPatience)) << arm->err();
+  ask({"--json", "--camera", "camera"});
+  EXPECT_THAT(said["camera"], HasSubstr("images per second of")) << arm->err();
+  EXPECT_THAT(said["intrinsics"], StartsWith("ok: focal length"));
+  EXPECT_THAT(said["tags"], StartsWith("ok: "));
 }
 
 TEST_F(PerceiveByCamera, ASnapshotShowsWhatWasLookedAt) {

@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "idl/text/nearest.hpp"
+#include "idl/types/number.hpp"
 #include "services/common/process/exit_codes.hpp"
 #include "services/common/process/program.hpp"
 
@@ -102,11 +103,6 @@ std::string first_line(const std::string& text) { return text.substr(0, text.fin
 
 // --- mistakes -----------------------------------------------------------------
 
-std::string hint(const Words& known, const std::string& word) {
-  const std::string meant = nearest(word, known);
-  return meant.empty() ? "" : fmt::format("; did you mean {}?", meant);
-}
-
 std::string meant_option(const CLI::App& app, const std::string& word) {
   Words known;  // without dashes, which all have in common
   for (const CLI::Option* option : options_of(app)) {
@@ -119,7 +115,8 @@ std::string meant_option(const CLI::App& app, const std::string& word) {
 std::string unknown_command(const CLI::App& app, const std::string& word) {
   const Words commands = names_of(commands_of(app));
   if (commands.empty()) return fmt::format("got subcommand '{}', wanted none: there are none", word);
-  return fmt::format("unknown subcommand '{}', wanted {}{}", word, fmt::join(commands, ", "), hint(commands, word));
+  return fmt::format("unknown subcommand '{}', wanted {}{}", word, fmt::join(commands, ", "),
+                     did_you_mean(word, commands));
 }
 
 // What the parser could not place; nothing if it placed everything.
@@ -161,7 +158,7 @@ std::string reworded(const CLI::App& app, const std::string& message) {
   if (std::regex_match(message, part, kSet)) {
     const Words values = split(part.str(3), ',');
     return fmt::format("{}: got '{}', wanted {}{}", part.str(1), part.str(2), fmt::join(values, ", "),
-                       hint(values, part.str(2)));
+                       did_you_mean(part.str(2), values));
   }
   if (std::regex_match(message, part, kKind)) {
     const auto* option = app.get_option_no_throw(part.str(1));
@@ -352,6 +349,15 @@ CLI::Option* add_seed_option(CLI::App& app, const std::string& name, std::uint64
       },
       "");
   return app.add_option(name, seed, help)->capture_default_str()->check(whole);
+}
+
+CLI::Validator port(int least) {
+  return {[least](std::string& text) {
+            constexpr int kMost = 65535;
+            if (text.empty() || parse_whole(text, least, kMost)) return std::string();
+            return fmt::format("got '{}', wanted a port, {} to {}", text, least, kMost);
+          },
+          ""};
 }
 
 void suggest(CLI::Option* option, const std::vector<std::string>& values) {

@@ -12,6 +12,7 @@
 namespace CLI {
 class App;
 class Option;
+class Validator;
 class ParseError;
 }  // namespace CLI
 
@@ -24,6 +25,9 @@ void suggest(CLI::Option* option, const std::vector<std::string>& values);
 /// Adds an option for the seed of random numbers, a whole number of 64 bits: a longer one is refused, where CLI11 would
 /// take the largest.
 CLI::Option* add_seed_option(CLI::App& app, const std::string& name, std::uint64_t& seed, const std::string& help);
+
+/// Checks that an option's value is a port from `least` on; an option that may stand without one passes so, too.
+CLI::Validator port(int least = 0);
 
 /// Says what is wrong with a command line that CLI11 refused, with the program's name before it: what was got, what is
 /// wanted, or which option was meant.

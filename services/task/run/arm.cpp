@@ -26,6 +26,14 @@ Result<Arm> parse_arm(const std::string& text) {
   return Error{Code::kInvalidArgument, fmt::format("--arm: got '{}', wanted sim, ur-sim or ur:HOST", text)};
 }
 
+Result<void> check_arm(const Arm& arm, const physics_pool::Scene& scene) {
+  if (arm.kind == Arm::Kind::kSim) return {};
+  if (auto arm_result = world::with_arm(scene, {}); !arm_result) {
+    return Error{Code::kInvalidArgument, fmt::format("--arm: scene '{}': {}", scene.name, arm_result.error().message)};
+  }
+  return {};
+}
+
 Result<Sensor> parse_sensor(const std::string& text) {
   constexpr std::string_view kMocap = "mocap:";
   if (text == "sim") return Sensor{};

@@ -29,6 +29,9 @@ struct Arm {
 /// Error kInvalidArgument.
 Result<Arm> parse_arm(const std::string& text);
 
+/// Error kInvalidArgument: no arm moves what the scene's robot is.
+Result<void> check_arm(const Arm& arm, const physics_pool::Scene& scene);
+
 /// What `--objects` names.
 struct Sensor {
   enum class Kind {

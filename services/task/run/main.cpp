@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/cores.hpp"
 #include "services/common/process/program.hpp"
 #include "services/task/run/display.hpp"
@@ -76,7 +77,8 @@ int main(int argc, char** argv) {
   auto* view = app.add_option("--view", options.view,
                               "Show the run in a browser and in Foxglove, at this port (default: 8765; 0: any)")
                    ->expected(0, 1)
-                   ->type_name("PORT");
+                   ->type_name("PORT")
+                   ->check(common::port());
   app.add_option("--rate", options.rate, "World seconds per second while acting; 0: as fast as possible")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
@@ -138,6 +140,7 @@ int main(int argc, char** argv) {
   if (pin) options.cores = common::allowed_cores();
   const common::StopSignal signal;
   if (auto ok = complete(arguments, options); !ok) return fail(ok.error(), common::exit_code_of(ok.error()));
+  if (auto ok = check_arm(options.arm, options.scene); !ok) return fail(ok.error(), common::kExitUsage);
   try {
     return perform(options, signal.token());
   } catch (const wire::SetupError& error) {

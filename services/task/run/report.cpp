@@ -133,6 +133,8 @@ Told told(std::uint8_t ending) {
     case endings::BROKEN:
     case endings::REFUSED:
       return {"BROKEN", common::kExitBroken};
+    case endings::INVALID:
+      return {"INVALID", common::kExitUsage};
     default:
       return {"FAILURE", common::kExitFailed};
   }
@@ -161,8 +163,10 @@ void print_summary(const RunOptions& options, const json& report) {
     fmt::print(out, "  parameter    {} {}, by default {}\n", change.key, to_text(change.after), to_text(change.before));
   }
   if (!options.record.empty()) {
-    fmt::print(out, "  bag          {}; `jostle replay {}` makes its decisions again\n", options.record.string(),
-               options.record.string());
+    const std::string bag = options.record.string();
+    fmt::print(out, "  bag          {}; {}\n", bag,
+               report["cost"].is_null() ? "it has no plan to be made again"
+                                        : fmt::format("`jostle replay {}` makes its decisions again", bag));
   }
 }
 

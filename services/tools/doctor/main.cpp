@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/program.hpp"
 #include "services/tools/doctor/environment.hpp"
 #include "services/tools/doctor/facts.hpp"
@@ -15,6 +16,7 @@
 #include "services/tools/doctor/machine.hpp"
 #include "services/tools/doctor/network.hpp"
 #include "services/tools/doctor/peer.hpp"
+#include "services/tools/doctor/sensors.hpp"
 #include "services/tools/doctor/shared_memory.hpp"
 
 namespace jostle::tools {
@@ -22,6 +24,8 @@ namespace {
 
 struct Arguments {
   bool as_json = false, clean = false, listen = false;
+  std::string camera;  // empty: not looked at
+  std::optional<perception::natnet::Client::Options> mocap;
   PeerOptions peer{.host = "", .port = kDoctorPort};
   wire::ParticipantOptions participant{.name = "jostle_doctor", .domain = {}, .waits_for_server = true};
 };
@@ -75,11 +79,27 @@ int listen(const Arguments& arguments, std::stop_token stop) {
   return common::kExitOk;
 }
 
+Result<std::vector<Check>> examine_eyes(const Arguments& arguments) {
+  std::vector<Check> checks;
+  if (arguments.mocap) checks = check_mocap(*arguments.mocap);
+  if (arguments.camera.empty()) return checks;
+  const auto participant_result = wire::Participant::open(arguments.participant);
+  if (!participant_result) return participant_result.error();
+  std::ranges::copy(check_camera(*participant_result, arguments.camera), std::back_inserter(checks));
+  return checks;
+}
+
 int report(const Arguments& arguments) {
   std::vector<Check> checks = examine(arguments.participant.domain);
   const auto joined = arguments.peer.host.empty() ? check_joining(arguments.participant)
                                                   : check_peer(arguments.peer, arguments.participant);
   std::ranges::copy(joined, std::back_inserter(checks));
+  const auto eyes_result = examine_eyes(arguments);
+  if (!eyes_result) {
+    fmt::print(stderr, "jostle doctor: {}\n", eyes_result.error().message);
+    return common::kExitUsage;
+  }
+  std::ranges::copy(*eyes_result, std::back_inserter(checks));
   if (arguments.as_json) {
     fmt::print("{}\n", to_json(checks).dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   } else {
@@ -98,7 +118,8 @@ int main(int argc, char** argv) {
   Arguments arguments;
   CLI::App app{
       "Says what is wrong with this machine, and the remedy; with --peer also what is wrong between it and\n"
-      "another one, on which `jostle doctor --listen` runs. Exits with 1 if anything FAILs.",
+      "another one, on which `jostle doctor --listen` runs; with --mocap and --camera what is wrong with what\n"
+      "they send. Exits with 1 if anything FAILs.",
       "jostle doctor"};
   app.add_flag("--json", arguments.as_json, "a list of {name, verdict, finding, remedy}");
   app.add_flag("--clean", arguments.clean, "first remove shared memory that killed processes left behind");
@@ -107,12 +128,20 @@ int main(int argc, char** argv) {
       ->excludes(listens);
   app.add_option("--port", arguments.peer.port, "TCP, at which the listening one answers")
       ->capture_default_str()
-      ->check(CLI::Range(1, 65535));
+      ->check(common::port(1));
+  std::string mocap;
+  auto* mocap_option =
+      app.add_option("--mocap", mocap, "Address or name of a motion capture's server (NatNet): listen to it")
+          ->excludes(listens);
+  app.add_option("--camera", arguments.camera, "Listen to the camera of ROS 2 whose images are on NAME/image_raw")
+      ->type_name("NAME")
+      ->excludes(listens);
   common::ProcessOptions process;
   common::add_process_options(app, process);
   if (const auto code = common::parse_arguments(app, argc, argv)) return *code;
   common::die_with_parent(process.parent);
   arguments.participant.domain = process.domain;
+  if (*mocap_option) arguments.mocap = {.host = mocap};
   if (arguments.clean) remove_leftovers(find_leftovers());
   try {
     if (!arguments.listen) return report(arguments);

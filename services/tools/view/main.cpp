@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/process/random_id.hpp"
@@ -104,7 +105,7 @@ int main(int argc, char** argv) {
                  "Folder with .msg files of types of your own, FOLDER/pkg/msg/Name.msg; may be given again\n"
                  "(AMENT_PREFIX_PATH is looked through, too)")
       ->allow_extra_args(false);
-  app.add_option("--port", options.port, "Port to listen at; 0: any")->capture_default_str();
+  app.add_option("--port", options.port, "Port to listen at; 0: any")->capture_default_str()->check(common::port());
   app.add_option("--address", options.address,
                  "Address to listen at. Others than loopback have a token, which the address that is shown contains")
       ->capture_default_str();

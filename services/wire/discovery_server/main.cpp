@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/program.hpp"
 #include "services/wire/dds/participant.hpp"
 
@@ -19,7 +20,7 @@ int main(int argc, char** argv) {
   app.add_option("--listen", server.address, "IPv4 address of this host; 0.0.0.0: all of them")
       ->capture_default_str()
       ->check(CLI::ValidIPV4);
-  app.add_option("--port", server.port, "UDP port")->capture_default_str()->check(CLI::Range(1, 65535));
+  app.add_option("--port", server.port, "UDP port")->capture_default_str()->check(common::port(1));
   app.add_option("--id", server.id, "Its place, from 0, in the list of servers that the others are given")
       ->capture_default_str()
       ->check(CLI::Range(0, 255));

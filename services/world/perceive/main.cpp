@@ -74,7 +74,9 @@ int main(int argc, char** argv) {
                                    "Motion capture that speaks NatNet 3.0 to 4.1; rigid bodies have the names of "
                                    "the scene's objects, and up is z");
   mocap->add_option("--host", options.client.host, "The server's address or name")->capture_default_str();
-  mocap->add_option("--port", options.client.command_port, "Its command port")->capture_default_str();
+  mocap->add_option("--port", options.client.command_port, "Its command port")
+      ->capture_default_str()
+      ->check(common::port(1));
   mocap->add_option("--interface", options.client.interface,
                     "IPv4 address of this host on which multicast is heard (default: the system's choice)");
   mocap

@@ -167,8 +167,10 @@ int main(int argc, char** argv) {
                          ->check(CLI::IsMember({"cb3", "e-series"}));
   common::suggest(generation, {"cb3", "e-series"});
   app.add_option(
-      "--pendant", options.pendant,
-      "Port that takes lines: protective stop, emergency stop, restart safety, reboot, remote, local (default: none)");
+         "--pendant", options.pendant,
+         "Port that takes lines: protective stop, emergency stop, restart safety, reboot, remote, local (default: "
+         "none)")
+      ->check(common::port());
   auto* no_eyes = app.add_flag("!--no-eyes", options.has_eyes, "Do not publish where the objects are");
   auto* mocap =
       app.add_option(
@@ -225,7 +227,7 @@ int main(int argc, char** argv) {
         if (!tags_result) return fail(tags_result.error());
         objects = std::make_unique<CameraOut>(*participant, *arm_result, std::move(tags_result).value(), 0);
       } else {
-        objects = std::make_unique<ObjectTopics>(*participant, kStandardForms);
+        objects = std::make_unique<ObjectTopics>(*participant, scene_hash(*scene_result), kStandardForms);
       }
     }
     std::optional<Eyes> eyes;

@@ -27,6 +27,8 @@ Result<BatchReply> AsyncPool::run(const RolloutBatch& batch, TimePoint deadline,
 
 Result<std::vector<BatchReply>> AsyncPool::run_all(std::span<const RolloutBatch> batches, TimePoint deadline,
                                                    std::stop_token stop) {
+  const Error cancelled{Code::kCancelled, "batch: cancelled by its caller"};
+  if (stop.stop_requested()) return cancelled;  // however short the batch is
   std::mutex mutex;  // guards missing, failure and replies
   std::condition_variable_any arrived;
   std::size_t missing = batches.size();
@@ -59,7 +61,7 @@ Result<std::vector<BatchReply>> AsyncPool::run_all(std::span<const RolloutBatch>
   tickets.clear();  // nothing of these batches runs after the call
   if (failure) return *failure;
   if (over) return replies;
-  if (stop.stop_requested()) return Error{Code::kCancelled, "batch: cancelled by its caller"};
+  if (stop.stop_requested()) return cancelled;
   return Error{Code::kDeadline,
                fmt::format("batch: {} of {} rollouts were unfinished at the deadline", unfinished, samples)};
 }

@@ -125,7 +125,7 @@ TEST_F(Outputs, PicturesHaveAnEndingAndAFolderOfTheirOwn) {
   EXPECT_THAT(other.err, HasSubstr("ends in .png, .mp4, .gif"));
   const Ended film = shell("jostle_render " + easy + " -o a.mp4");
   EXPECT_EQ(film.code, 2);
-  EXPECT_THAT(film.err, HasSubstr("for a single picture, wanted .png"));
+  EXPECT_THAT(film.err, HasSubstr("for a scene's start, wanted .png"));
   EXPECT_EQ(shell("jostle_render " + easy + " -o - --size 64x48 >a.png").code, 0);
   EXPECT_THAT(contents(folder.path() / "a.png").substr(1, 3), "PNG");
 }

@@ -6,6 +6,7 @@
 
 #include "physics_pool/local/thread_pool.hpp"
 #include "planners/controllers/catalogue.hpp"
+#include "services/bags/replay/changes.hpp"
 #include "services/bags/replay/report.hpp"
 #include "services/common/process/command_line.hpp"
 #include "services/common/process/cores.hpp"
@@ -36,11 +37,21 @@ Result<std::vector<RecordedRun>> load(const Arguments& arguments) {
   return select_runs(std::move(runs_result).value(), arguments.goal);
 }
 
+// Before a word is said of any run.
+Result<void> check_settings(const std::vector<RecordedRun>& runs, const ReplayOptions& options) {
+  for (const RecordedRun& run : runs) {
+    jostle_msgs::msg::Goal goal = run.run.goal();
+    if (auto changes_result = apply_changes(options.settings, goal); !changes_result) return changes_result.error();
+  }
+  return {};
+}
+
 int perform(Arguments arguments, std::stop_token stop) {
   auto runs_result = load(arguments);
   if (!runs_result) return fail(runs_result.error());
   if (!arguments.controller.empty())
     arguments.options.settings.insert(arguments.options.settings.begin(), "controller=" + arguments.controller);
+  if (auto ok = check_settings(*runs_result, arguments.options); !ok) return fail(ok.error());
   arguments.options.on_plan = [](const auto& replayed, const auto* recorded, const StateLayout& layout) {
     fmt::print("{}", plan_line(replayed, recorded, layout));
     std::fflush(stdout);
@@ -50,6 +61,10 @@ int perform(Arguments arguments, std::stop_token stop) {
   bool equal = true;
   for (const RecordedRun& run : *runs_result) {
     fmt::print("{}", headline(run));
+    if (run.plans.empty() && arguments.options.settings.empty()) {  // a plan made now would be compared with none
+      fmt::print("{}", kNothingToCompare);
+      continue;
+    }
     auto report_result = replay(run, arguments.options, pool, stop);
     if (!report_result) return fail(report_result.error());
     fmt::print("{}", verdict(run, *report_result));

@@ -16,7 +16,7 @@ std::string headline(const RecordedRun& recorded) {
   const auto& goal = recorded.run.goal();
   std::string text;
   for (const std::string& message : recorded.unreadable) text += fmt::format("cannot be read: {}\n", message);
-  return text + fmt::format("{}: {}, predictor {}, seed {}; {} plans, {} actions; {}\n  recorded by {}; {}; {}\n",
+  return text + fmt::format("{}: {}, predictor {}, seed {}; {} plans, {} commands; {}\n  recorded by {}; {}; {}\n",
                             goal.goal_id(), goal.controller(), goal.predictor(), goal.seed(), recorded.plans.size(),
                             recorded.observations.size() - 1, end_of(recorded), recorded.run.build(),
                             recorded.run.engine(), recorded.run.machine());
@@ -34,10 +34,10 @@ std::string plan_line(const jostle_msgs::msg::Plan& replayed, const jostle_msgs:
 
 std::string verdict(const RecordedRun& recorded, const ReplayReport& report) {
   const Comparison& comparison = report.comparison;
-  const std::string counts = fmt::format("{} of {} plans, {} of {} actions", comparison.equal_plans, comparison.plans,
+  const std::string counts = fmt::format("{} of {} plans, {} of {} commands", comparison.equal_plans, comparison.plans,
                                          comparison.equal_actions, comparison.actions);
   if (comparison.bit_equal() && comparison.plans == 0) {
-    return "NOTHING TO COMPARE: the recorded run ended before its first plan\n";
+    return kNothingToCompare;
   }
   if (comparison.bit_equal()) {
     std::string text = fmt::format("BIT-EQUAL: {}\n", counts);
@@ -53,7 +53,7 @@ std::string verdict(const RecordedRun& recorded, const ReplayReport& report) {
   if (!first.effect.empty()) text += fmt::format("  effect     {}\n", first.effect);
   for (const std::string& reason : report.reasons()) text += fmt::format("  why        {}\n", reason);
   text += fmt::format("  altogether {} are equal; each was decided on what was observed in the recorded run\n", counts);
-  text += fmt::format("  end        recorded: {}; replayed: {} ({} plans, {} actions)\n", end_of(recorded),
+  text += fmt::format("  end        recorded: {}; replayed: {} ({} plans, {} commands)\n", end_of(recorded),
                       report.ended, report.decisions.plans.size(), report.decisions.observations.size() - 1);
   return text;
 }

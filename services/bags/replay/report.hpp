@@ -16,6 +16,9 @@ std::string headline(const RecordedRun& recorded);
 std::string plan_line(const jostle_msgs::msg::Plan& replayed, const jostle_msgs::msg::Plan* recorded,
                       const StateLayout& layout);
 
+/// The verdict on a run that has no plan.
+inline constexpr const char* kNothingToCompare = "NOTHING TO COMPARE: the recorded run ended before its first plan\n";
+
 /// Writes the verdict: where the runs part, what differs there, why, and how much they agree.
 std::string verdict(const RecordedRun& recorded, const ReplayReport& report);
 

@@ -102,13 +102,13 @@ bool is_film(const fs::path& output) { return output.extension() == ".mp4" || ou
 
 bool is_sheet(const fs::path& output) { return output.extension() == ".png" || files::is_standard(output); }
 
-Result<void> check_target(const fs::path& output, bool has_one_frame) {
+Result<void> check_target(const fs::path& output, const std::string& still) {
   const bool is_folder = output.extension().empty() && !files::is_standard(output);
   const files::Output target{
       .option = "--output", .path = output, .endings = {".png", ".mp4", ".gif"}, .is_folder = is_folder};
-  if (has_one_frame && is_film(output)) {
-    return invalid(target.option, fmt::format("'{}' for a single picture", output.string()),
-                   ".png; films are drawn of a bag, or of several frames");
+  if (!still.empty() && is_film(output)) {
+    return invalid(target.option, fmt::format("'{}' for {}", output.string(), still),
+                   ".png; films are drawn of a run that moved, or of several frames");
   }
   auto ok = files::check_output(target);
   if (ok || !is_folder) return ok;

@@ -32,10 +32,11 @@ struct DrawOptions {
 Result<void> draw(const Frames& frames, const std::filesystem::path& output, const DrawOptions& options,
                   std::stop_token stop);
 
-/// Checks before any work that draw() can write there; `has_one_frame`: of which no film can be made.
+/// Checks before any work that draw() can write there. `still`: "a scene's start" or the like, of which no film can be
+/// made; empty: there are several frames.
 /// Errors   kInvalidArgument  another ending; a film of one frame; a folder in which there is something
 ///          kIo               no such file, or folder, can be made
-Result<void> check_target(const std::filesystem::path& output, bool has_one_frame);
+Result<void> check_target(const std::filesystem::path& output, const std::string& still);
 
 /// Whether draw() makes a sheet for that name.
 bool is_sheet(const std::filesystem::path& output);

@@ -47,10 +47,13 @@ Result<Frames> load(const Arguments& arguments) {
 }
 
 Result<void> run(const Arguments& arguments, std::stop_token stop) {
-  if (auto ok = check_target(arguments.output, is_scene(arguments.input)); !ok) return ok;
+  if (auto ok = check_target(arguments.output, is_scene(arguments.input) ? "a scene's start" : ""); !ok) return ok;
   auto frames_result = load(arguments);
   if (!frames_result) return frames_result.error();
-  if (auto ok = check_target(arguments.output, frames_result->frames.size() == 1); !ok) return ok;
+  const bool is_still = frames_result->frames.size() == 1;
+  const bool is_bag = !is_scene(arguments.input) && arguments.input.extension() != ".json";
+  const char* still = is_bag ? "a run in which nothing moved" : "one frame";
+  if (auto ok = check_target(arguments.output, is_still ? still : ""); !ok) return ok;
   common::ProgressLine line({.doing = "drawing", .unit = "frames"});
   DrawOptions options = arguments.draw;
   options.on_progress = [&line](std::size_t drawn, std::size_t all) { line.show(drawn, all); };

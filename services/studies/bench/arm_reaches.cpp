@@ -14,7 +14,9 @@
 #include "physics_pool/task/task_geometry.hpp"
 #include "planners/approach/straight_reach.hpp"
 #include "services/common/charts/statistics.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/results/results.hpp"
+#include "services/studies/bench/catalogue.hpp"
 
 namespace jostle::studies {
 namespace {
@@ -217,5 +219,53 @@ Result<void> bench_arm_reaches(const ArmReachesOptions& options) {
   if (options.json.empty()) return {};
   return common::write_results(options.json, {{"seed", options.seed}, {"results", std::move(rows)}});
 }
+
+namespace {
+
+class ArmReachesBenchmark final : public Benchmark {
+ public:
+  ArmReachesBenchmark()
+      : Benchmark(
+            "arm-reaches",
+            "fast random reaches of an arm into shelves: what diverges, what is inside what, which torques it takes",
+            "10 min", Uses::kNothing) {}
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--reaches", options_.reaches, "Reaches of each kind")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1'000'000));
+    app.add_option("--speeds", options_.speeds, "Speeds of the hand, m/s")
+        ->capture_default_str()
+        ->delimiter(',')
+        ->check(CLI::Range(0.05, 5.0));
+    app.add_option("--time-steps", options_.time_steps, "Steps of the engine, s")
+        ->capture_default_str()
+        ->delimiter(',')
+        ->check(CLI::Range(2e-4, 4e-3));
+    app.add_option("--contact-times", options_.contact_times,
+                   "Times in which bodies in contact part, s; at least 2 steps")
+        ->capture_default_str()
+        ->delimiter(',')
+        ->check(CLI::Range(4e-4, 0.1));
+    common::add_seed_option(app, "--seed", options_.seed, "Of the first shelf; 10 reaches in each");
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_arm_reaches(options_));
+  }
+
+  const char* unit() const override { return "reaches"; }
+
+ private:
+  ArmReachesOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> arm_reaches_benchmark() { return std::make_unique<ArmReachesBenchmark>(); }
 
 }  // namespace jostle::studies

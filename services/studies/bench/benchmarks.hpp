@@ -104,6 +104,10 @@ Result<void> measure_bag(const Settings& settings);
 /// time it takes as heard here against the time it has in the bag, ms.
 Result<void> measure_play(const Settings& settings);
 
+/// Measures a whole run of `jostle run` in scenes/clutter.yaml with a server for viewers and two viewers that subscribe
+/// to everything, against the same run alone, seconds.
+Result<void> measure_viewers(const Settings& settings);
+
 /// Is the other process of `round-trip`: answers every assignment until it is told to
 /// end. Returns the exit code.
 int serve_echo(int domain, std::stop_token stop);

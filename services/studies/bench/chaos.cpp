@@ -17,8 +17,10 @@
 
 #include "services/common/charts/statistics.hpp"
 #include "services/common/lab/hosts.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/results/results.hpp"
+#include "services/studies/bench/catalogue.hpp"
 #include "services/studies/bench/chaos_schedule.hpp"
 #include "services/studies/bench/plan_again.hpp"
 #include "services/studies/bench/swarm.hpp"
@@ -323,5 +325,44 @@ Result<bool> bench_chaos(const ChaosOptions& options) {
   if (!report.complete) return Error{Code::kCancelled, "interrupted"};
   return report.unequal == 0;
 }
+
+namespace {
+
+class ChaosBenchmark final : public Benchmark {
+ public:
+  ChaosBenchmark()
+      : Benchmark("chaos", "plans while workers are killed, stalled and unplugged: all bit-equal, and how slow",
+                  "2 min", Uses::kDomain) {}
+
+  void add_options(CLI::App& app) override {
+    common::add_seed_option(app, "--seed", options_.seed, "Seed of the schedule of faults");
+    app.add_option("--faults", options_.faults, "How many faults; three or so a second")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1'000'000));
+    app.add_option("--workers", options_.workers, "Worker processes")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.json = json;
+    options_.domain = start.domain;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    const auto equal_result = bench_chaos(options_);
+    if (!equal_result) return equal_result.error();
+    return int{*equal_result ? common::kExitOk : common::kExitFailed};
+  }
+
+  const char* unit() const override { return "faults"; }
+
+ private:
+  ChaosOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> chaos_benchmark() { return std::make_unique<ChaosBenchmark>(); }
 
 }  // namespace jostle::studies

@@ -13,7 +13,10 @@
 #include "planners/guided/candidates.hpp"
 #include "planners/guided/forecast.hpp"
 #include "services/common/charts/statistics.hpp"
+#include "services/common/process/command_line.hpp"
+#include "services/common/process/files.hpp"
 #include "services/common/results/results.hpp"
+#include "services/studies/bench/catalogue.hpp"
 #include "services/studies/bench/cheap_physics.hpp"
 #include "services/task/config/parameters.hpp"
 
@@ -239,5 +242,46 @@ Result<void> bench_coarse_grasp(const CoarseGraspOptions& options) {
   }
   return ok;
 }
+
+namespace {
+
+class CoarseGrasp final : public Benchmark {
+ public:
+  CoarseGrasp()
+      : Benchmark("coarse-grasp", "coarse physics of a grasp beside the engine: price, ranking, successes found",
+                  "15 min", Uses::kNothing) {}
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--objects", options_.objects, "Objects beside the target, one row of the table each")
+        ->delimiter(',')
+        ->capture_default_str()
+        ->check(CLI::Range(0, 40));
+    app.add_option("--worlds", options_.worlds, "Worlds for each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    app.add_option("--candidates", options_.candidates, "Candidates in each world")
+        ->capture_default_str()
+        ->check(CLI::Range(2, 100'000));
+    common::add_seed_option(app, "--seed", options_.seed, "Seed of the first world; the next ones follow");
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.parameters = common::data_file("experiments/grasping.yaml");
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_coarse_grasp(options_));
+  }
+
+  const char* unit() const override { return "worlds"; }
+
+ private:
+  CoarseGraspOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> coarse_grasp_benchmark() { return std::make_unique<CoarseGrasp>(); }
 
 }  // namespace jostle::studies

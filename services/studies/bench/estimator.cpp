@@ -15,7 +15,9 @@
 #include "perception/estimator/source_clock.hpp"
 #include "physics_pool/feasible/nearest_state.hpp"
 #include "services/common/charts/statistics.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/results/results.hpp"
+#include "services/studies/bench/catalogue.hpp"
 
 namespace jostle::studies {
 namespace {
@@ -316,5 +318,39 @@ Result<void> bench_estimator(const EstimatorBenchOptions& options) {
   return common::write_results(options.json,
                                {{"worlds", options.worlds}, {"seed", options.seed}, {"results", std::move(rows)}});
 }
+
+namespace {
+
+class EstimatorBenchmark final : public Benchmark {
+ public:
+  EstimatorBenchmark()
+      : Benchmark("estimator",
+                  "the estimate of objects against the last measurement: error, lag, overlaps, under every trouble",
+                  "1 min", Uses::kNothing) {}
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--worlds", options_.worlds, "Worlds of each kind of trouble, 20 s each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    common::add_seed_option(app, "--seed", options_.seed, "Of the worlds and of what sensors say of them");
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_estimator(options_));
+  }
+
+  const char* unit() const override { return "worlds"; }
+
+ private:
+  EstimatorBenchOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> estimator_benchmark() { return std::make_unique<EstimatorBenchmark>(); }
 
 }  // namespace jostle::studies

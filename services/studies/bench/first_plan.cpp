@@ -9,7 +9,10 @@
 #include "physics_pool/local/thread_pool.hpp"
 #include "physics_pool/scenarios/chapter3.hpp"
 #include "services/common/charts/statistics.hpp"
+#include "services/common/process/command_line.hpp"
+#include "services/common/process/files.hpp"
 #include "services/common/results/results.hpp"
+#include "services/studies/bench/catalogue.hpp"
 #include "services/task/session/composition.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 
@@ -177,5 +180,50 @@ Result<void> bench_first_plan(const FirstPlanOptions& options, const std::filesy
   }
   return stop.stop_requested() ? Result<void>(Error{Code::kCancelled, "interrupted"}) : Result<void>();
 }
+
+namespace {
+
+class FirstPlan final : public Benchmark {
+ public:
+  FirstPlan()
+      : Benchmark("first-plan", "first plans and re-plans of grasps in fresh worlds, without and with guidance",
+                  "an hour", Uses::kNothing) {}
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--worlds", options_.worlds, "Worlds, one run of each side in each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    common::add_seed_option(app, "--seed", options_.first_seed, "Seed of the first world; the next ones follow");
+    app.add_option("--objects", options_.objects, "Objects beside the target")
+        ->capture_default_str()
+        ->check(CLI::Range(0, 40));
+    app.add_option("--table", options_.table, "Side of the table, m; 0: as dense as in Sec. 3.3.1")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 10.0));
+    app.add_option("--workers", options_.workers, "Threads of the pool")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--timeout", options_.timeout, "Seconds of one run")
+        ->capture_default_str()
+        ->check(CLI::Range(1.0, 1e6));
+    app.add_flag("--no-before{false}", options_.before, "Leave the side without guidance away");
+    app.add_option("--guidance", options_.guidance, "Candidates per iteration of the side with guidance")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.line = start.line;
+    return exit_code(bench_first_plan(options_, json, common::data_file("experiments/grasping.yaml"), start.stop));
+  }
+
+ private:
+  FirstPlanOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> first_plan_benchmark() { return std::make_unique<FirstPlan>(); }
 
 }  // namespace jostle::studies

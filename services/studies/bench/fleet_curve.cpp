@@ -10,8 +10,10 @@
 
 #include "services/common/charts/plot.hpp"
 #include "services/common/charts/statistics.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/process/files.hpp"
 #include "services/common/results/results.hpp"
+#include "services/studies/bench/catalogue.hpp"
 
 namespace jostle::studies {
 namespace {
@@ -176,5 +178,58 @@ Result<void> bench_fleet(const FleetCurveOptions& options) {
   if (options.picture.empty()) return {};
   return draw(points, options.picture);
 }
+
+namespace {
+
+class FleetCurve final : public Benchmark {
+ public:
+  FleetCurve()
+      : Benchmark("fleet", "simulated: efficiency from one lane to thousands on many hosts, some of which die", "2 min",
+                  Uses::kNothing) {}
+
+  void add_options(CLI::App& app) override {
+    FleetOptions& fleet = options_.fleet;
+    app.add_option("--hosts", fleet.hosts, "Hosts of the largest fleet, with a worker process each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--lanes", fleet.lanes, "Threads of each worker")->capture_default_str()->check(CLI::Range(1, 1024));
+    app.add_option("--sample", fleet.sample, "Seconds that a sample takes")
+        ->capture_default_str()
+        ->check(CLI::Range(1e-4, 100.0));
+    app.add_option("--samples", fleet.samples_per_lane, "Samples per lane, of one batch")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    app.add_option("--deaths", fleet.deaths_per_minute, "Share of the hosts that die in a minute")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1.0));
+    app.add_option("--measured", options_.measured, "What `jostle bench lanes --json` wrote, to be simulated as well");
+    common::add_seed_option(app, "--seed", fleet.seed, "Seed of latencies and deaths");
+    add_json(app);
+    app.add_option("--plot", plot_, "File for a picture of efficiency over lanes: .png, .svg or .pdf");
+  }
+
+  Result<void> check() const override {
+    if (auto ok = check_picture(plot_); !ok) return ok;
+    return Benchmark::check();
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.picture = plot_;
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_fleet(options_));
+  }
+
+  const char* unit() const override { return "fleets"; }
+
+ private:
+  FleetCurveOptions options_;
+  std::string plot_;
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> fleet_curve_benchmark() { return std::make_unique<FleetCurve>(); }
 
 }  // namespace jostle::studies

@@ -15,8 +15,10 @@
 #include "physics_pool/scenarios/push.hpp"
 #include "physics_pool/uncertainty/belief.hpp"
 #include "services/common/charts/statistics.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/results/results.hpp"
 #include "services/common/results/table.hpp"
+#include "services/studies/bench/catalogue.hpp"
 #include "services/task/session/composition.hpp"
 #include "services/world/in_process/in_process_world.hpp"
 
@@ -235,5 +237,53 @@ Result<void> bench_idle(const IdleOptions& options, const std::filesystem::path&
   }
   return stop.stop_requested() ? Result<void>(Error{Code::kCancelled, "interrupted"}) : Result<void>();
 }
+
+namespace {
+
+class Idle final : public Benchmark {
+ public:
+  Idle()
+      : Benchmark("idle",
+                  "how long robots stand still before their actions, with plans made meanwhile and while they act",
+                  "an hour", Uses::kNothing) {}
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--rows", options_.rows, "Only these, such as tampc-strip,mpc")
+        ->delimiter(',')
+        ->check(CLI::IsMember(idle_rows()));
+    app.add_option("--worlds", options_.worlds, "Worlds of each row, and one run of each side in each")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    common::add_seed_option(app, "--seed", options_.first_seed, "Seed of the first world; the next ones follow");
+    app.add_option("--nearness", options_.nearness, "control.plan_while_acting of the side that has it, m")
+        ->capture_default_str()
+        ->check(CLI::Range(1e-9, 1e3));
+    app.add_option("--noise", options_.noise, "Slope b of the noise in the worlds of Ch. 5")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1.0));
+    app.add_option("--rate", options_.rate, "World seconds per second while acting")
+        ->capture_default_str()
+        ->check(CLI::Range(0.01, 1e3));
+    app.add_option("--workers", options_.workers, "Threads of the pool")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--timeout", options_.timeout, "Seconds of one run")
+        ->capture_default_str()
+        ->check(CLI::Range(1.0, 1e6));
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.line = start.line;
+    return exit_code(bench_idle(options_, json, start.stop));
+  }
+
+ private:
+  IdleOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> idle_benchmark() { return std::make_unique<Idle>(); }
 
 }  // namespace jostle::studies

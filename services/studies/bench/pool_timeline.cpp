@@ -9,9 +9,11 @@
 #include <nlohmann/json.hpp>
 
 #include "services/common/charts/lanes.hpp"
+#include "services/common/process/cores.hpp"
 #include "services/common/results/results.hpp"
 #include "services/pool/client/timeline.hpp"
 #include "services/studies/bench/benchmarks.hpp"
+#include "services/studies/bench/catalogue.hpp"
 #include "services/studies/bench/swarm.hpp"
 #include "services/studies/bench/workload.hpp"
 
@@ -250,5 +252,53 @@ Result<void> bench_pool(const PoolTimelineOptions& options) {
   }
   return ran;
 }
+
+namespace {
+
+class PoolTimeline final : public Benchmark {
+ public:
+  PoolTimeline()
+      : Benchmark("pool", "what each worker did when: busy shares, gaps, a picture", "10 s", Uses::kDomain) {}
+
+  void add_options(CLI::App& app) override {
+    options_.workers = common::usable_cores();
+    app.add_option("--workers", options_.workers, "Worker processes (default: one per core that this process may use)")
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--clients", options_.clients, "Clients at once, each with shorter samples than the one before")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 8));
+    app.add_option("--repeats", options_.batches, "Batches of each client")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    app.add_flag("--urgent", options_.urgent, "The last client's batches are urgent");
+    app.add_flag("--pin", pin_, "Give each worker a core of its own, in turn");
+    app.add_option("--timeline", timeline_, "File for a picture of what each worker did when: .png, .svg or .pdf");
+    add_json(app);
+  }
+
+  Result<void> check() const override {
+    if (auto ok = check_picture(timeline_); !ok) return ok;
+    return Benchmark::check();
+  }
+
+  Result<int> run(const Start& start) override {
+    if (pin_) options_.cores = common::allowed_cores();
+    options_.picture = timeline_;
+    options_.json = json;
+    options_.domain = start.domain;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_pool(options_));
+  }
+
+ private:
+  PoolTimelineOptions options_;
+  std::string timeline_;
+  bool pin_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> pool_timeline_benchmark() { return std::make_unique<PoolTimeline>(); }
 
 }  // namespace jostle::studies

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -25,7 +24,9 @@
 #include "services/common/process/files.hpp"
 #include "services/common/process/program.hpp"
 #include "services/common/results/results.hpp"
+#include "services/studies/bench/catalogue.hpp"
 #include "services/studies/bench/measurement.hpp"
+#include "services/studies/bench/run_process.hpp"
 #include "services/studies/bench/workload.hpp"
 #include "services/wire/dds/names.hpp"
 #include "services/wire/dds/raw.hpp"
@@ -279,43 +280,6 @@ void print_loop(const char* name, const json& loop) {
   print_delays("   append", loop["append_us"]);
 }
 
-// CPU time of all processes that were started and have ended, and of those that they started.
-double children_cpu_seconds() {
-  rusage used{};
-  getrusage(RUSAGE_CHILDREN, &used);
-  const auto seconds = [](const timeval& time) {
-    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-  };
-  return seconds(used.ru_utime) + seconds(used.ru_stime);
-}
-
-// A plan of several seconds; the value is its time, the hash its own. `meanwhile` is called
-// over and over until the run has ended.
-Result<Sample> plan(const RecordBenchOptions& options, const fs::path& folder,
-                    const std::function<Result<void>(common::ChildProcess&)>& meanwhile) {
-  const fs::path result = folder / "result.json";
-  auto run_result = common::ChildProcess::start(
-      common::program_folder() / "jostle_run",
-      {(folder / "scene.yaml").string(), "--plan-only", "--seed", "7", "--headless", "--parameters",
-       (folder / "parameters.yaml").string(), "--json", result.string(), "--domain", std::to_string(options.domain)},
-      folder / "run.log");
-  if (!run_result) return run_result.error();
-  while (!run_result->ended()) {
-    if (options.stop.stop_requested()) return Error{Code::kCancelled, "interrupted"};
-    if (auto ok = meanwhile(*run_result); !ok) return ok.error();
-  }
-  const common::ExitStatus ended = *run_result->ended();
-  if (!ended.ok() && ended.code != common::kExitFailed) {  // failed: no plan is good enough, by intent
-    return Error{Code::kUnavailable, "the run: " + ended.text() + "\n" + run_result->last_words()};
-  }
-  auto report_result = read_json(result);
-  if (!report_result) return report_result.error();
-  if (!(*report_result)["plan_seconds"].is_number() || !(*report_result)["plan_hash"].is_string())
-    return Error{Code::kUnavailable, "the run made no plan: " + run_result->last_words()};
-  return Sample{.value = (*report_result)["plan_seconds"],
-                .hash = hash_of((*report_result)["plan_hash"].get<std::string>())};
-}
-
 Result<void> disturbance(const RecordBenchOptions& options, const fs::path& folder) {
   auto scene_result = clutter(5);
   if (!scene_result) return scene_result.error();
@@ -327,24 +291,30 @@ Result<void> disturbance(const RecordBenchOptions& options, const fs::path& fold
   }
   // Comes in the middle, is stopped, and comes again: the middleware of everybody finds and
   // forgets it each time.
-  const auto visit = [&](common::ChildProcess& run) -> Result<void> {
+  const auto visit = [&](common::ChildProcess& planning) -> Result<void> {
     const fs::path bag = folder / "bag";
     fs::remove_all(bag);
     auto recorder_result = start_recorder(bag, options.domain);
     if (!recorder_result) return recorder_result.error();
-    run.wait_for(kVisit);
+    planning.wait_for(kVisit);
     return stop_recorder(*recorder_result);
   };
-  const auto alone = [&](common::ChildProcess& run) -> Result<void> {
-    run.wait_for(kVisit);
+  const auto alone = [&](common::ChildProcess& planning) -> Result<void> {
+    planning.wait_for(kVisit);
     return {};
   };
+  const RunProcess run{.folder = folder,
+                       .arguments = {(folder / "scene.yaml").string(), "--plan-only", "--seed", "7", "--parameters",
+                                     (folder / "parameters.yaml").string()},
+                       .seconds = "plan_seconds",
+                       .domain = options.domain,
+                       .stop = options.stop};
   const Turns turns{.repeats = options.pairs, .stop = options.stop, .cpu_seconds = children_cpu_seconds, .on_run = [&] {
                       options.line->step();
                     }};
   options.line->expect(static_cast<std::size_t>(turns.runs()));
-  auto result = compare({"plan, recorded", [&] { return plan(options, folder, visit); }},
-                        {"plan alone", [&] { return plan(options, folder, alone); }}, turns);
+  auto result = compare({"plan, recorded", [&] { return run_once(run, visit); }},
+                        {"plan alone", [&] { return run_once(run, alone); }}, turns);
   if (!result) return result.error();
   result->name = "record-disturbance";
   result->unit = "s";
@@ -443,5 +413,67 @@ int publish_for_record(const RecordBenchOptions& options) {
   const auto ok = common::write_text(options.json, words.dump() + "\n");
   return ok && received ? common::kExitOk : common::kExitBroken;
 }
+
+namespace {
+
+class Record : public Benchmark {
+ public:
+  Record() : Record("record", "the recorder at 20,000 messages per second, or what it costs a plan", "75 s") {}
+
+  void add_options(CLI::App& app) override {
+    add_pace(app);
+    auto* disturbance =
+        app.add_flag("--disturbance", disturbance_, "Measure the time of a plan with and without a recorder instead");
+    app.add_option("--repeats", pairs_, "Pairs of plans of --disturbance")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000))
+        ->needs(disturbance);
+  }
+
+  Result<int> run(const Start& start) override { return exit_code(bench_record(options_for(start))); }
+
+  const char* unit() const override { return disturbance_ ? "plans" : "s"; }
+
+ protected:
+  Record(const char* its_name, const char* its_purpose, const char* it_takes)
+      : Benchmark(its_name, its_purpose, it_takes, Uses::kDomain) {}
+
+  void add_pace(CLI::App& app) {
+    app.add_option("--rate", options_.rate, "Messages of 1 KiB per second")
+        ->capture_default_str()
+        ->check(CLI::Range(1.0, 1e6));
+    app.add_option("--seconds", options_.seconds, "How long")->capture_default_str()->check(CLI::Range(0.1, 86400.0));
+    add_json(app);
+  }
+  RecordBenchOptions options_for(const Start& start) const {
+    RecordBenchOptions options = options_;
+    if (disturbance_) options.pairs = pairs_;
+    options.json = json;
+    options.domain = start.domain;
+    options.stop = start.stop;
+    options.line = start.line;
+    return options;
+  }
+
+ private:
+  RecordBenchOptions options_;
+  bool disturbance_ = false;
+  int pairs_ = 9;
+};
+
+/// The other process of `record`.
+class Publisher final : public Record {
+ public:
+  Publisher() : Record("publish", "", "") {}
+
+  void add_options(CLI::App& app) override { add_pace(app); }
+  Result<void> check() const override { return {}; }
+  Result<int> run(const Start& start) override { return publish_for_record(options_for(start)); }
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> record_benchmark() { return std::make_unique<Record>(); }
+std::unique_ptr<Benchmark> publisher_benchmark() { return std::make_unique<Publisher>(); }
 
 }  // namespace jostle::studies

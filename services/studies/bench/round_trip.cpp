@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "services/studies/bench/benchmarks.hpp"
+#include "services/studies/bench/catalogue.hpp"
 #include "services/studies/bench/echo.hpp"
 #include "services/studies/bench/several_hosts.hpp"
 #include "services/studies/bench/swarm.hpp"
@@ -239,5 +240,19 @@ Result<void> measure_hosts(const Settings& settings) {
   }
   return {};
 }
+
+namespace {
+
+/// The other process of `round-trip`.
+class EchoServer final : public Benchmark {
+ public:
+  EchoServer() : Benchmark("echo", "", "", Uses::kDomain) {}
+  void add_options(CLI::App&) override {}
+  Result<int> run(const Start& start) override { return serve_echo(start.domain, start.stop); }
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> echo_server_benchmark() { return std::make_unique<EchoServer>(); }
 
 }  // namespace jostle::studies

@@ -13,7 +13,9 @@
 #include "perception/tags/detector.hpp"
 #include "perception/tags/pose.hpp"
 #include "services/common/charts/statistics.hpp"
+#include "services/common/process/command_line.hpp"
 #include "services/common/results/results.hpp"
+#include "services/studies/bench/catalogue.hpp"
 #include "services/studies/bench/measurement.hpp"
 
 namespace jostle::studies {
@@ -200,5 +202,40 @@ Result<void> bench_tags(const TagsOptions& options) {
                                               {"corner_sigma_px", kCornerSigma},
                                               {"results", std::move(rows)}});
 }
+
+namespace {
+
+class Tags final : public Benchmark {
+ public:
+  Tags()
+      : Benchmark(
+            "tags",
+            "poses of tags in rendered images: errors, flips, honest covariances, time beside libapriltag's defaults",
+            "1 min", Uses::kNothing) {}
+
+  void add_options(CLI::App& app) override {
+    app.add_option("--frames", options_.frames, "Frames of 15 tags at each of three distances")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100'000));
+    common::add_seed_option(app, "--seed", options_.seed, "Of the tags' poses and the images' noise");
+    add_json(app);
+  }
+
+  Result<int> run(const Start& start) override {
+    options_.json = json;
+    options_.stop = start.stop;
+    options_.line = start.line;
+    return exit_code(bench_tags(options_));
+  }
+
+  const char* unit() const override { return "frames"; }
+
+ private:
+  TagsOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Benchmark> tags_benchmark() { return std::make_unique<Tags>(); }
 
 }  // namespace jostle::studies

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <atomic>
 #include <boost/asio/io_context.hpp>
@@ -13,6 +12,7 @@
 
 #include "perception/natnet/client.hpp"
 #include "perception/natnet/server.hpp"
+#include "tests/fuzz/fuzz_main.hpp"
 #include "tests/fuzz/wire/mutation.hpp"
 #include "tests/support/soon.hpp"
 #include "tests/support/test_domain.hpp"
@@ -152,17 +152,10 @@ class Fuzzer {
 }  // namespace jostle::tests
 
 int main(int argc, char** argv) {
-  CLI::App app("Sends spoilt messages of motion capture (NatNet) to what reads them, to our client and to our server.");
   long inputs = 1'000'000;
-  std::uint64_t seed = 1;
-  app.add_option("--inputs", inputs, "To the readers; a tenth as many to each side's socket")->capture_default_str();
-  app.add_option("--seed", seed, "Of all random numbers")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
-  try {
-    jostle::tests::Fuzzer(inputs, seed).run();
-    return 0;
-  } catch (const std::exception& failure) {
-    fmt::print(stderr, "FAILED (--seed {}): {}\n", seed, failure.what());
-    return 1;
-  }
+  return jostle::tests::fuzz_main(
+      argc, argv,
+      "Sends spoilt messages of motion capture (NatNet) to what reads them, to our client and to our server.",
+      {{"--inputs", "To the readers; a tenth as many to each side's socket", &inputs}},
+      [&](std::uint64_t seed) { jostle::tests::Fuzzer(inputs, seed).run(); });
 }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -12,6 +11,7 @@
 #include "perception/camera/camera.hpp"
 #include "perception/tags/detector.hpp"
 #include "perception/tags/pose.hpp"
+#include "tests/fuzz/fuzz_main.hpp"
 #include "tests/fuzz/wire/mutation.hpp"
 
 namespace jostle::tests {
@@ -147,17 +147,8 @@ class Fuzzer {
 }  // namespace jostle::tests
 
 int main(int argc, char** argv) {
-  CLI::App app("Looks for tags in spoilt images, and makes poses of what it finds.");
   long inputs = 1'000'000;
-  std::uint64_t seed = 1;
-  app.add_option("--inputs", inputs, "Images")->capture_default_str();
-  app.add_option("--seed", seed, "Of all random numbers")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
-  try {
-    jostle::tests::Fuzzer(inputs, seed).run();
-    return 0;
-  } catch (const std::exception& failure) {
-    fmt::print(stderr, "FAILED (--seed {}): {}\n", seed, failure.what());
-    return 1;
-  }
+  return jostle::tests::fuzz_main(argc, argv, "Looks for tags in spoilt images, and makes poses of what it finds.",
+                                  {{"--inputs", "Images", &inputs}},
+                                  [&](std::uint64_t seed) { jostle::tests::Fuzzer(inputs, seed).run(); });
 }

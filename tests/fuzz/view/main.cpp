@@ -1,9 +1,8 @@
 // Spoilt requests of viewers, to what reads the text frames of their sockets; and spoilt frames, to the sockets.
 
 #include <fmt/format.h>
-
 #include <unistd.h>
-#include <CLI/CLI.hpp>
+
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -13,6 +12,7 @@
 
 #include "services/tools/view/protocol.hpp"
 #include "services/tools/view/view_server.hpp"
+#include "tests/fuzz/fuzz_main.hpp"
 #include "tests/fuzz/view/attacker.hpp"
 #include "tests/fuzz/wire/mutation.hpp"
 
@@ -150,19 +150,11 @@ void run(long inputs, std::uint64_t seed) {
 }  // namespace jostle::tests
 
 int main(int argc, char** argv) {
-  CLI::App app("Sends spoilt requests of viewers to what reads them, and spoilt frames to a server.");
   long inputs = 1'000'000, frames = 1'000'000;
-  std::uint64_t seed = 1;
-  app.add_option("--inputs", inputs, "Requests")->capture_default_str();
-  app.add_option("--frames", frames, "Frames")->capture_default_str();
-  app.add_option("--seed", seed, "Of all random numbers")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
-  try {
-    jostle::tests::run(inputs, seed);
-    jostle::tests::attack(frames, seed);
-    return 0;
-  } catch (const std::exception& failure) {
-    fmt::print(stderr, "FAILED (--seed {}): {}\n", seed, failure.what());
-    return 1;
-  }
+  return jostle::tests::fuzz_main(
+      argc, argv, "Sends spoilt requests of viewers to what reads them, and spoilt frames to a server.",
+      {{"--inputs", "Requests", &inputs}, {"--frames", "Frames", &frames}}, [&](std::uint64_t seed) {
+        jostle::tests::run(inputs, seed);
+        jostle::tests::attack(frames, seed);
+      });
 }

@@ -6,61 +6,22 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
 
-import { endAll, load, record, serve, start } from "./programs.mjs";
+import { browse } from "./browser.mjs";
+import { endAll, record, serve } from "./programs.mjs";
 
 const kSlowest = 0.1; // of the rates that the page offers
 
-const { WebSocket } = await load("ws");
 const folder = mkdtempSync(join(tmpdir(), "jostle-page-"));
 after(async () => {
   await endAll();
   rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
 });
 
-/** Chromium by its DevTools protocol: one page. */
-async function browse(url) {
-  const args = ["--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--enable-unsafe-swiftshader",
-    "--use-angle=swiftshader", "--remote-debugging-port=0", `--user-data-dir=${join(folder, "profile")}`,
-    "--window-size=1280,800", "about:blank"];
-  const { child, match, ended } = await start(process.env.JOSTLE_CHROMIUM, args, /ws:\/\/\S+/);
-  const origin = new URL(match[0]).host;
-  const targets = await (await fetch(`http://${origin}/json`)).json();
-  const socket = new WebSocket(targets.find(({ type }) => type === "page").webSocketDebuggerUrl);
-  await new Promise((resolve) => socket.once("open", resolve));
-  const waiting = new Map();
-  const errors = [];
-  socket.on("message", (data) => {
-    const { id, method, params, result, error } = JSON.parse(data);
-    if (method === "Runtime.exceptionThrown") errors.push(params.exceptionDetails.exception?.description);
-    if (method === "Log.entryAdded" && params.entry.level === "error") errors.push(params.entry.text);
-    waiting.get(id)?.(error ? Promise.reject(new Error(error.message)) : result);
-  });
-  let count = 0;
-  const call = (method, params = {}) =>
-    new Promise((resolve) => {
-      waiting.set(++count, resolve);
-      socket.send(JSON.stringify({ id: count, method, params }));
-    });
-  for (const domain of ["Runtime", "Log", "Page"]) await call(`${domain}.enable`);
-  await call("Page.navigate", { url });
-  const evaluate = async (expression) => {
-    const { result, exceptionDetails } = await call("Runtime.evaluate", { expression, returnByValue: true, awaitPromise: true });
-    assert.equal(exceptionDetails, undefined, expression);
-    return result.value;
-  };
-  /** Waits until an expression is true in the page. */
-  const until = async (expression) => {
-    while (!(await evaluate(`Boolean(${expression})`))) await evaluate("new Promise(requestAnimationFrame)");
-  };
-  const close = async () => (socket.close(), child.kill(), await ended);
-  return { call, evaluate, until, errors, close };
-}
-
 test("a recorded run is seen, and its objects move", async () => {
   const { bag, code } = await record(folder);
   assert.ok([0, 1].includes(code), `jostle run ended with ${code}`);
   const { url, stop } = await serve(bag);
-  const page = await browse(url);
+  const page = await browse(url, folder);
   await page.until(`document.readyState === "complete" && document.getElementById("state").textContent === "connected"`);
   const press = (key) => page.evaluate(`void dispatchEvent(new KeyboardEvent("keydown", {key: ${JSON.stringify(key)}}))`);
   const target = `[...document.querySelectorAll("#objects tr")].find((row) => row.cells[0].textContent === "target")`;

@@ -43,12 +43,12 @@ export async function start(program, args, ready, environment = {}) {
 
 export const ours = (name) => join(process.env.JOSTLE_PROGRAMS, name);
 
-/** A run of the pusher, recorded; the folder of its bag. */
-export async function record(folder) {
+const kPush = join(process.env.JOSTLE_SOURCE_DIR, "scenes/push-obstacle.yaml");
+
+/** A run, recorded, of the pusher unless told; the folder of its bag. */
+export async function record(folder, scene = kPush, options = ["--predictor", "coarse,learned"]) {
   const bag = join(folder, "bag");
-  const scene = join(process.env.JOSTLE_SOURCE_DIR, "scenes/push-obstacle.yaml");
-  const args = [scene, "--pool", "threads", "--workers", "2", "--predictor", "coarse,learned",
-    "--headless", "--record", bag];
+  const args = [scene, "--pool", "threads", "--workers", "2", ...options, "--headless", "--record", bag];
   const domain = String(kFirstDomain + (process.pid % 30));
   const { ended } = await start(ours("jostle_run"), args, /./, { TMPDIR: folder, ROS_DOMAIN_ID: domain });
   return { bag, code: await ended };

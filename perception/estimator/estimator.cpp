@@ -32,7 +32,8 @@ Result<Estimator::Event> Estimator::checked(double time, const Sighting& sightin
   };
   if (!std::isfinite(time)) return complaint("time", "a finite number of seconds");
   if (sighting.explanations.empty()) return complaint("explanations", "at least one");
-  Event event{.time = time, .candidates = {}};
+  if (!(sighting.steady >= 0 && sighting.steady <= 1)) return complaint("steady", "a share, 0 to 1");
+  Event event{.time = time, .candidates = {}, .steady = sighting.steady};
   for (const Explanation& explanation : sighting.explanations) {
     const auto& [p, q] = explanation.X_WB;
     PoseBelief pose{.p = {p[0], p[1], p[2]}, .R = {q[0], q[1], q[2], q[3]}};
@@ -251,7 +252,8 @@ std::vector<Estimate> Estimator::at(double time) const {
                       .seen = time - state.last_seen <= options_.unseen_after,
                       .rests = filter.rests() || !goes_on};
     Eigen::Map<Matrix6d> covariance(estimate.covariance.data());
-    covariance = pose.covariance;
+    const Event& newest = track.steps.back().event;
+    covariance = pose.covariance + newest.steady * newest.candidates.front().pose.covariance;
     covariance.diagonal().head<3>().array() += options_.systematic * options_.systematic;
     covariance.diagonal().tail<3>().array() += options_.systematic_turning * options_.systematic_turning;
     estimates.push_back(std::move(estimate));

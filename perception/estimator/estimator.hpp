@@ -29,6 +29,8 @@ struct Explanation {
 struct Sighting {
   std::string name;
   std::vector<Explanation> explanations;
+  /// Share of the covariance, 0 to 1, that is the same each time the object is seen at rest: no averaging removes it.
+  double steady = 0.0;
 };
 
 struct EstimatorOptions {
@@ -106,6 +108,7 @@ class Estimator {
   struct Event {  // a measurement
     double time = 0.0;
     std::vector<Candidate> candidates;
+    double steady = 0.0;  // see Sighting
     bool relocates = false;
   };
   struct Step {

@@ -43,7 +43,7 @@ std::array<double, 36> turned(const std::array<double, 36>& covariance, const Ei
 
 // What a tag says of its object. Of two minima the likelier one explains the corners better, and stands.
 perception::Sighting sighting(const ObjectTag& tag, const perception::PoseEstimate& estimate, const Isometry3d& X_WC) {
-  perception::Sighting sighting{tag.object, {}};
+  perception::Sighting sighting{.name = tag.object, .explanations = {}, .steady = perception::kSteadyShare};
   const auto add = [&](const perception::Fit& fit) {
     const Isometry3d X_WB = X_WC * transform(fit.X_CB);
     const double tilt = std::acos(std::clamp(X_WB.linear()(2, 2), -1.0, 1.0));

@@ -334,6 +334,21 @@ TEST(Estimator, TheSurerOfTwoSensorsCountsMore) {
   EXPECT_LT(std::sqrt(squares), 0.0012);
 }
 
+// As of a camera, whose pixels lie under the edges of a tag at rest in the same way each time.
+TEST(Estimator, WhatIsTheSameEachTimeStaysDoubtful) {
+  Sensor sensor(0.003, 17);
+  Estimator averaged, doubtful;
+  for (int i = 0; i < 100; ++i) {
+    Sighting sighting = sensor.see("can", {0.1, 0, 0.05});
+    ASSERT_TRUE(averaged.take(i * kFrame, {sighting}));
+    sighting.steady = 0.5;
+    ASSERT_TRUE(doubtful.take(i * kFrame, {sighting}));
+  }
+  const Estimate sure = averaged.at(99 * kFrame).at(0), sut = doubtful.at(99 * kFrame).at(0);
+  EXPECT_EQ(sut.reading.position, sure.reading.position);
+  EXPECT_NEAR(sut.covariance[0] - sure.covariance[0], 0.5 * 0.003 * 0.003, 1e-12);
+}
+
 TEST(Estimator, AWorldThatStandsStillMayBeMeasuredForEver) {
   Sensor sensor(0.005, 15);
   Estimator sut;

@@ -3,9 +3,16 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "perception/rendering/renderer.hpp"
+#include "services/common/process/child_process.hpp"
+#include "services/wire/dds/reader.hpp"
+#include "services/wire/dds/topics.hpp"
+#include "services/world/camera/camera_out.hpp"
 #include "tests/support/run_fixture.hpp"
 
 namespace jostle::tests {
@@ -37,6 +44,7 @@ class PerceiveByCamera : public RunFixture {
  protected:
   // Each image costs a tenth of a second of a core, or more on a busy machine.
   static constexpr auto kSlow = 3 * kPatience;
+  static constexpr int kFrames = 40;
 };
 
 TEST_F(PerceiveByCamera, RunGraspsWhatRenderedPixelsShow) {
@@ -111,6 +119,56 @@ TEST_F(PerceiveByCamera, ASnapshotShowsWhatWasLookedAt) {
   sut->signal(SIGTERM);
   EXPECT_EQ(sut->wait(kPatience), 0) << sut->err();
   EXPECT_THAT(contents(picture), StartsWith("\x89PNG"));
+}
+
+// Frames as a device would give them: written to a file, and read back.
+TEST_F(PerceiveByCamera, AVideoOfTheSceneShowsWhereObjectsAre) {
+  const physics_pool::Scene scene = three_objects();
+  const perception::SceneCamera eye(world::simulated_camera());
+  const perception::View view =
+      world::view_of(scene, world::tags_of(scene).value(), physics_pool::initial_state(scene), world::overhead(scene));
+  for (int i = 0; i < kFrames; ++i) {
+    const perception::GreyImage image = eye.render(view, static_cast<std::uint64_t>(i));
+    std::ofstream file(folder.path() / fmt::format("{}.pgm", i), std::ios::binary);
+    file << "P5 " << image.width << ' ' << image.height << " 255\n";
+    file.write(reinterpret_cast<const char*>(image.pixels.data()), static_cast<std::streamsize>(image.pixels.size()));
+  }
+  const std::string video = folder.path() / "video.mkv";
+  ASSERT_TRUE(common::run_tool("ffmpeg", "ffmpeg",
+                               {"-framerate", "10", "-i", folder.path() / "%d.pgm", "-c:v", "ffv1", video},
+                               folder.path() / "ffmpeg.log"));
+  const std::string intrinsics = folder.write("camera.yaml", perception::to_yaml(world::simulated_camera()));
+  const auto participant = wire::Participant::open({.domain = domain}).value();
+  wire::Inbox<jostle_msgs::msg::ObjectStates> states(participant, wire::topics::kObjectStates, kFrames);
+
+  const auto sut = program("jostle_perceive", {"camera", video, "--intrinsics", intrinsics, "--scene", easy});
+
+  const auto seen = states.take(std::chrono::steady_clock::now() + kSlow);
+  ASSERT_TRUE(seen) << sut->err();
+  ASSERT_EQ(seen->objects().size(), scene.objects.size());
+  for (const auto& object : seen->objects()) {
+    const auto truth = std::ranges::find(scene.objects, object.name(), &physics_pool::SceneObject::name);
+    ASSERT_NE(truth, scene.objects.end());
+    EXPECT_NEAR(object.pose().position().x(), truth->x, 0.003) << object.name();
+    EXPECT_NEAR(object.pose().position().y(), truth->y, 0.003) << object.name();
+  }
+  EXPECT_EQ(sut->wait(kPatience), 0) << "it ends with the file: " << sut->err();
+  EXPECT_THAT(sut->err(), HasSubstr(fmt::format("{} frames", kFrames)));
+}
+
+TEST_F(PerceiveByCamera, AVideoWithoutIntrinsicsAndOneThatIsNoneAreRefused) {
+  const std::string none = folder.write("none.mkv", "no video");
+  const auto bare = program("jostle_perceive", {"camera", none, "--scene", easy});
+  EXPECT_EQ(bare->wait(kPatience), 2);
+  EXPECT_THAT(bare->err(), HasSubstr("--intrinsics: got none"));
+  const std::string intrinsics = folder.write("camera.yaml", perception::to_yaml(world::simulated_camera()));
+  const auto spoilt = program("jostle_perceive", {"camera", none, "--intrinsics", intrinsics, "--scene", easy});
+  EXPECT_EQ(spoilt->wait(kPatience), 3);
+  EXPECT_THAT(spoilt->err(), HasSubstr("cannot be opened as a video"));
+  const auto missing =
+      program("jostle_perceive", {"camera", "/dev/video99", "--intrinsics", intrinsics, "--scene", easy});
+  EXPECT_EQ(missing->wait(kPatience), 2);
+  EXPECT_THAT(missing->err(), HasSubstr("/dev/video99: got no such device"));
 }
 
 TEST_F(PerceiveByCamera, WhatACameraCannotDoIsRefused) {

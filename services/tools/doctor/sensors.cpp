@@ -19,7 +19,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr auto kPatience = std::chrono::seconds(8);  // for the first frame, or image
+constexpr auto kPatience = std::chrono::seconds(5);  // for the first frame, or image
 constexpr auto kLook = std::chrono::seconds(3);      // from then on
 constexpr auto kTick = std::chrono::milliseconds(50);
 constexpr double kFewFrames = 10.0;  // per second: objects that are pushed are seen too late

@@ -15,11 +15,8 @@
 #include "physics_pool/render/picture.hpp"
 #include "physics_pool/scene/scene.hpp"
 #include "services/common/process/trouble.hpp"
-#include "services/wire/dds/camera_topics.hpp"
-#include "services/wire/dds/reader.hpp"
-#include "services/world/camera/messages.hpp"
 #include "services/world/camera/scene_tags.hpp"
-#include "services/world/link/messages.hpp"
+#include "services/world/perceive/images.hpp"
 #include "services/world/perceive/sight.hpp"
 
 namespace jostle::world {
@@ -109,6 +106,24 @@ class Looker {
   common::Trouble bad_{"tags without a pose"};
 };
 
+Result<std::unique_ptr<ImageSource>> open_source(const wire::Participant& participant, const CameraOptions& options) {
+  if (!perception::is_video_source(options.source)) {
+    if (options.intrinsics.empty())
+      return std::unique_ptr<ImageSource>(std::make_unique<TopicImages>(participant, options.source));
+    return invalid("--intrinsics", "it for the topics of '" + options.source + "'",
+                   "none: they bring their own on camera_info");
+  }
+  if (options.intrinsics.empty()) {
+    return invalid("--intrinsics", "none for " + options.source,
+                   "the file that `jostle calibrate camera` writes: a video says nothing of its lens");
+  }
+  auto camera_result = perception::load_camera(options.intrinsics);
+  if (!camera_result) return camera_result.error();
+  auto video_result = perception::Video::open(options.source, camera_result->width, camera_result->height);
+  if (!video_result) return video_result.error();
+  return std::unique_ptr<ImageSource>(std::make_unique<VideoImages>(std::move(video_result).value(), *camera_result));
+}
+
 }  // namespace
 
 Result<void> look_through_camera(const wire::Participant& participant, const CameraOptions& options,
@@ -117,43 +132,34 @@ Result<void> look_through_camera(const wire::Participant& participant, const Cam
   if (!scene_result) return scene_result.error();
   auto tags_result = tags_of(*scene_result);
   if (!tags_result) return tags_result.error();
+  auto source_result = open_source(participant, options);
+  if (!source_result) return source_result.error();
+  ImageSource& source = **source_result;
   Looker looker(std::move(tags_result).value(), options.X_WC.value_or(overhead(*scene_result)));
   Sight sight(participant, std::move(scene_result).value());
-  wire::Inbox<sensor_msgs::msg::Image> images(participant, wire::camera_image(options.name), 1);
-  wire::Inbox<sensor_msgs::msg::CameraInfo> infos(participant, wire::camera_info(options.name), 1);
-  common::Trouble bad("bad messages of the camera");
-  std::optional<perception::Camera> camera;
+  common::Trouble bad("images of another size");
   std::uint64_t frames = 0;
   perception::GreyImage last;
   std::vector<perception::Detection> found_last;
-  spdlog::info("looking at {}/image_raw, domain {}", options.name, participant.domain());
-  while (!stop.stop_requested()) {
-    auto image = images.take(Clock::now() + kTick, stop);
-    for (const sensor_msgs::msg::CameraInfo& info : infos.take_all()) {
-      auto camera_result = from_message(info);
-      if (camera_result)
-        camera = *camera_result;
-      else
-        bad.warn("{}", camera_result.error().message);
-    }
-    if (!image || !camera) continue;
-    auto image_result = from_message(*image);
-    if (!image_result) {
-      bad.warn("{}", image_result.error().message);
+  spdlog::info("looking at {}, domain {}", options.source, participant.domain());
+  while (!stop.stop_requested() && !source.has_ended()) {
+    auto shot_result = source.take(Clock::now() + kTick, stop);
+    if (!shot_result) return shot_result.error();
+    if (!*shot_result) continue;
+    const perception::GreyImage& image = (*shot_result)->image;
+    const perception::Camera& camera = *source.camera();
+    if (image.width != camera.width || image.height != camera.height) {
+      bad.warn("image: got {}x{} pixels, wanted {}x{} as the intrinsics say", image.width, image.height, camera.width,
+               camera.height);
       continue;
     }
-    if (image_result->width != camera->width || image_result->height != camera->height) {
-      bad.warn("image: got {}x{} pixels, wanted {}x{} as camera_info says", image_result->width, image_result->height,
-               camera->width, camera->height);
-      continue;
-    }
-    if (frames++ == 0) spdlog::info("frames come from {}", options.name);
-    found_last = looker.detect(*image_result);
-    sight.look(seconds(image->header()), looker.sightings_of(*camera, found_last));
+    if (frames++ == 0) spdlog::info("frames come from {}", options.source);
+    found_last = looker.detect(image);
+    sight.look((*shot_result)->time, looker.sightings_of(camera, found_last));
     sight.say_unseen();
-    last = std::move(image_result).value();
+    last = std::move((*shot_result)->image);
   }
-  spdlog::info("{} frames, {} bad messages", frames, bad.count());
+  spdlog::info("{} frames, {} bad messages", frames, source.bad() + bad.count());
   sight.say_counts();
   if (options.snapshot.empty()) return {};
   if (frames == 0) return Error{Code::kIo, fmt::format("{}: no image came", options.snapshot.string())};

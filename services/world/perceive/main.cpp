@@ -93,10 +93,15 @@ int main(int argc, char** argv) {
   common::add_process_options(*mocap, process);
   CameraOptions camera_options;
   std::vector<double> at;
-  auto* camera =
-      app.add_subcommand("camera", "A camera of ROS 2 that sees AprilTags (36h11) on the tops of the objects");
-  camera->add_option("topic", camera_options.name, "Images come on TOPIC/image_raw, intrinsics on TOPIC/camera_info")
+  auto* camera = app.add_subcommand("camera", "A camera that sees AprilTags (36h11) on the tops of the objects");
+  camera
+      ->add_option(
+          "source", camera_options.source,
+          "A device (/dev/video0), a video file, or an address (rtsp://HOST/PATH); else the name of a camera of\n"
+          "ROS 2: images come on NAME/image_raw, intrinsics on NAME/camera_info")
       ->capture_default_str();
+  camera->add_option("--intrinsics", camera_options.intrinsics,
+                     "Of a device, a file or an address: the camera's file that `jostle calibrate camera` writes");
   camera
       ->add_option("--scene", camera_options.scene,
                    "Scene file; its first object has tag 0, and so on, each as large as fits in whole millimetres")

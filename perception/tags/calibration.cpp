@@ -19,6 +19,9 @@ constexpr double kLeastShare = 0.6;    // of the image's width and height that c
 constexpr double kMostSpread = 0.002;  // of the focal length, two standard deviations
 constexpr double kMostError = 2.0;     // pixels
 constexpr double kMostPosition = 0.001, kMostRotation = 0.1 * M_PI / 180;  // m, rad, two standard deviations
+constexpr std::size_t kFewestFlanges = 6;
+constexpr double kLeastFlangeTurn = 20.0;                                  // degrees, about each of two axes
+constexpr double kMostMisfit = 0.005, kMostMisfitTurn = 1.0 * M_PI / 180;  // m, rad
 constexpr double kDegrees = 180 / M_PI;
 
 Result<void> check_views(int width, int height, std::span<const std::vector<TagView>> views) {
@@ -70,6 +73,58 @@ Result<void> check_spread(const Calibration& calibration) {
                  fmt::format("a focal length of {:.1f} +- {:.2f} and a centre +- {:.2f} pixels", calibration.camera.fx,
                              2 * calibration.focal_sigma, 2 * calibration.centre_sigma),
                  fmt::format("+- {:.2f}: take more pictures, nearer, and more tilted", 2 * allowed));
+}
+
+// By how much the flange turned about the axis about which it turned second most, degrees.
+double second_turn(std::span<const Eigen::Isometry3d> flanges) {
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  double most = 0.0;
+  for (const Eigen::Isometry3d& a : flanges) {
+    for (const Eigen::Isometry3d& b : flanges) {
+      const Eigen::AngleAxisd turn(a.linear().transpose() * b.linear());
+      most = std::max(most, turn.angle());
+      const Eigen::Vector3d w = turn.angle() * turn.axis();
+      spread += w * w.transpose();
+    }
+  }
+  const Eigen::Vector3d shares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
+  return kDegrees * most * std::sqrt(std::max(shares(1), 0.0) / std::max(shares(2), 1e-12));
+}
+
+Eigen::Isometry3d isometry(const cv::Mat& R, const cv::Mat& p) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  for (int i = 0; i < 3; ++i) {
+    X.translation()(i) = p.at<double>(i);
+    for (int j = 0; j < 3; ++j) X.linear()(i, j) = R.at<double>(i, j);
+  }
+  X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
+  return X;
+}
+
+void add(const Eigen::Isometry3d& X, std::vector<cv::Mat>& turns, std::vector<cv::Mat>& ways) {
+  cv::Mat R(3, 3, CV_64F), p(3, 1, CV_64F);
+  for (int i = 0; i < 3; ++i) {
+    p.at<double>(i) = X.translation()(i);
+    for (int j = 0; j < 3; ++j) R.at<double>(i, j) = X.linear()(i, j);
+  }
+  turns.push_back(R);
+  ways.push_back(p);
+}
+
+// The pose in the middle of several that are nearly the same.
+Eigen::Isometry3d middle_of(std::span<const Eigen::Isometry3d> poses) {
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+  Eigen::Matrix4d spread = Eigen::Matrix4d::Zero();
+  for (const Eigen::Isometry3d& X : poses) {
+    p += X.translation() / static_cast<double>(poses.size());
+    const Eigen::Vector4d q = Eigen::Quaterniond(X.linear()).coeffs();
+    spread += q * q.transpose();
+  }
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation() = p;
+  const Eigen::Vector4d q = Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(spread).eigenvectors().col(3);
+  X.linear() = Eigen::Quaterniond(q).normalized().toRotationMatrix();
+  return X;
 }
 
 // The root of a covariance's largest eigenvalue.
@@ -161,6 +216,54 @@ Result<Extrinsics> locate_camera(const Camera& camera, std::span<const TagView> 
                              2 * kDegrees * result.rotation_sigma),
                  fmt::format("+- {:.0f} mm and {:.1f} degrees: use more tags, larger ones, and farther apart",
                              1e3 * kMostPosition, kDegrees * kMostRotation));
+}
+
+Result<HandEye> calibrate_hand_eye(const Camera& camera, std::span<const HandEyeView> views, Mounted mounted) {
+  std::vector<Eigen::Isometry3d> flanges, sheets;  // X_WF; X_CB
+  for (const HandEyeView& view : views) {
+    if (view.tags.size() < kFewestTags) continue;
+    const auto estimate_result = estimate_pose(camera, view.tags);
+    if (!estimate_result) return estimate_result.error();
+    flanges.push_back(transform(view.X_WF));
+    sheets.push_back(transform(estimate_result->best.X_CB));
+  }
+  if (flanges.size() < kFewestFlanges)
+    return invalid("views", fmt::format("{} of {} with {} tags or more", flanges.size(), views.size(), kFewestTags),
+                   fmt::format("at least {}: take more pictures of the whole sheet", kFewestFlanges));
+  if (const double turn = second_turn(flanges); turn < kLeastFlangeTurn)
+    return invalid("views", fmt::format("a flange that turned by {:.0f} degrees about a second axis", turn),
+                   fmt::format("{:.0f} or more: turn the wrist left and right, and up and down", kLeastFlangeTurn));
+  std::vector<cv::Mat> hand_turns, hand_ways, sheet_turns, sheet_ways;
+  for (std::size_t i = 0; i < flanges.size(); ++i) {
+    add(mounted == Mounted::kCamera ? flanges[i] : flanges[i].inverse(), hand_turns, hand_ways);
+    add(sheets[i], sheet_turns, sheet_ways);
+  }
+  cv::Mat R, p;
+  try {
+    cv::calibrateHandEye(hand_turns, hand_ways, sheet_turns, sheet_ways, R, p, cv::CALIB_HAND_EYE_PARK);
+  } catch (const cv::Exception& error) {
+    return Error{Code::kInvalidArgument, fmt::format("views: no place of the camera explains them: {}", error.err)};
+  }
+  const Eigen::Isometry3d X_camera = isometry(R, p);
+  std::vector<Eigen::Isometry3d> still;  // the sheet, where it does not move
+  for (std::size_t i = 0; i < flanges.size(); ++i)
+    still.push_back((mounted == Mounted::kCamera ? flanges[i] : flanges[i].inverse()) * X_camera * sheets[i]);
+  const Eigen::Isometry3d X_sheet = middle_of(still);
+  HandEye result{.X_camera = pose_of(X_camera), .X_sheet = pose_of(X_sheet)};
+  for (const Eigen::Isometry3d& X : still) {
+    const double angle = Eigen::AngleAxisd(X.linear().transpose() * X_sheet.linear()).angle();
+    result.position_error += (X.translation() - X_sheet.translation()).squaredNorm();
+    result.rotation_error += angle * angle;
+  }
+  result.position_error = std::sqrt(result.position_error / static_cast<double>(still.size()));
+  result.rotation_error = std::sqrt(result.rotation_error / static_cast<double>(still.size()));
+  if (result.position_error <= kMostMisfit && result.rotation_error <= kMostMisfitTurn) return result;
+  return invalid("views",
+                 fmt::format("a sheet that moves by {:.1f} mm and {:.2f} degrees, though it should not",
+                             1e3 * result.position_error, kDegrees * result.rotation_error),
+                 fmt::format("at most {:.0f} mm and {:.0f} degree: is each pose that of its picture, in m and rad, and "
+                             "of the flange?",
+                             1e3 * kMostMisfit, kDegrees * kMostMisfitTurn));
 }
 
 }  // namespace jostle::perception

@@ -46,4 +46,26 @@ struct Extrinsics {
 /// pixels), or a pose that the tags leave uncertain: two standard deviations are more than 1 mm or 0.1 degrees.
 Result<Extrinsics> locate_camera(const Camera& camera, std::span<const TagView> tags);
 
+/// What rides on an arm's flange F, while the other one stands still.
+enum class Mounted { kCamera, kSheet };
+
+/// A picture of the sheet, and where the flange was.
+struct HandEyeView {
+  Pose X_WF;                  ///< as the arm says; W is whatever frame it says it in
+  std::vector<TagView> tags;  ///< what on_board() returns
+};
+
+struct HandEye {
+  Pose X_camera;                ///< kCamera: X_FC; kSheet: X_WC
+  Pose X_sheet;                 ///< kCamera: X_WB; kSheet: X_FB
+  double position_error = 0.0;  ///< m, root mean square distance of the sheet in a view from where it is in the mean
+  double rotation_error = 0.0;  ///< rad, the same
+};
+
+/// Finds where a camera is on an arm, or beside one that shows it the sheet, by OpenCV's calibrateHandEye (Park and
+/// Martin, "Robot Sensor Calibration: Solving AX = XB on the Euclidean Group", TRA 1994).
+/// Error kInvalidArgument, with the remedy: fewer than 6 views with 4 tags, a flange that turned by less than 20 degrees,
+/// or about one axis alone, or poses that do not fit the pictures (more than 5 mm or 1 degree).
+Result<HandEye> calibrate_hand_eye(const Camera& camera, std::span<const HandEyeView> views, Mounted mounted);
+
 }  // namespace jostle::perception

@@ -5,11 +5,13 @@
 #include <Eigen/Geometry>
 #include <map>
 #include <random>
+#include <vector>
 
 #include "idl/types/transform.hpp"
 #include "perception/rendering/renderer.hpp"
 #include "perception/tags/detector.hpp"
 #include "perception/tags/pose.hpp"
+#include "perception/tags/sheet.hpp"
 
 namespace jostle::tests {
 
@@ -41,6 +43,24 @@ inline Pose tilted(const Eigen::Vector3d& p_C, double tilt, double about, double
   X.rotate(Eigen::AngleAxisd(tilt, Eigen::Vector3d(std::cos(about), std::sin(about), 0)));
   X.rotate(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
   return pose_of(X);
+}
+
+/// Twelve tags of 45 mm on a page, as `jostle tags print` lays them out and `jostle calibrate` expects them.
+inline perception::Page sheet() {
+  std::vector<perception::PrintedTag> tags;
+  for (int i = 0; i < 12; ++i) tags.push_back({.id = i, .size = 0.045, .label = {}});
+  return perception::lay_out(tags)->front();
+}
+
+/// What a camera at the world's origin sees of that page.
+inline perception::View view_of_sheet(const Pose& X_CB) {
+  perception::View view;
+  for (const perception::PlacedTag& placed : sheet()) {
+    const double half = placed.tag.size * perception::kTagCells / perception::kTagBorderCells / 2;
+    const Pose X_BT{.position = {placed.x + half, placed.y + half, 0}};
+    view.stickers.push_back({placed.tag.id, placed.tag.size, pose_of(transform(X_CB) * transform(X_BT))});
+  }
+  return view;
 }
 
 /// Returns the places of a tag's corners in a perfect image.

@@ -12,12 +12,6 @@ namespace {
 using namespace tests;
 using testing::HasSubstr;
 
-Page sheet() {
-  std::vector<PrintedTag> tags;
-  for (int i = 0; i < 12; ++i) tags.push_back({.id = i, .size = 0.045, .label = {}});
-  return lay_out(tags)->front();
-}
-
 // X_CB of a sheet whose middle is at (x, y, z), tilted about an axis in its plane.
 Pose sheet_at(double x, double y, double z, double tilt, double about) {
   const Pose middle{.position = {-0.095, -0.125, 0}};
@@ -39,13 +33,7 @@ std::vector<std::vector<TagView>> views_of(const std::vector<Pose>& poses) {
   const Page board = sheet();
   std::vector<std::vector<TagView>> views;
   for (const Pose& X_CB : poses) {
-    View view;
-    for (const PlacedTag& placed : board) {
-      const double half = placed.tag.size * kTagCells / kTagBorderCells / 2;
-      const Pose X_BT{.position = {placed.x + half, placed.y + half, 0}};
-      view.stickers.push_back({placed.tag.id, placed.tag.size, pose_of(transform(X_CB) * transform(X_BT))});
-    }
-    views.push_back(on_board(detector.detect(eye.render(view, views.size())), board));
+    views.push_back(on_board(detector.detect(eye.render(view_of_sheet(X_CB), views.size())), board));
   }
   return views;
 }
@@ -144,6 +132,61 @@ TEST(Extrinsics, WhatDoesNotSayEnoughIsRefused) {
   auto tags = tags_on_table(X_WC, 0.1, 9, 1);
   tags[4].X_BT.position[0] += 0.03;
   EXPECT_THAT(complaint(tags), HasSubstr("measure the places again"));
+}
+
+// Twelve poses from which a camera sees the sheet's middle, turned about its axis, too.
+std::vector<Pose> places_to_look_from() {
+  std::vector<Pose> places;
+  for (int i = 0; i < 12; ++i) {
+    const double about = 2 * M_PI * i / 12;
+    const Eigen::Isometry3d X = transform(
+        looking_at({0.1 + 0.35 * std::cos(about), -0.12 + 0.35 * std::sin(about), 0.4 + 0.01 * i}, {0.1, -0.12, 0}));
+    places.push_back(pose_of(X * Eigen::AngleAxisd(0.6 * (i % 3 - 1), Eigen::Vector3d::UnitZ())));
+  }
+  return places;
+}
+
+constexpr Pose kCameraOnFlange{.position = {0.03, -0.05, 0.08},
+                               .orientation = {0.9659258262890683, 0, 0, 0.25881904510252074}};
+
+// The sheet lies on the table, and a camera on the flange looks at it; or, seen from the camera, the other way round.
+std::vector<HandEyeView> hand_eye_views(Mounted mounted) {
+  const Eigen::Isometry3d X_WB(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()));
+  std::vector<Pose> X_CB, X_WF;
+  for (const Pose& X_WC : places_to_look_from()) {
+    X_CB.push_back(pose_of(transform(X_WC).inverse() * X_WB));
+    // kSheet: the camera stands where kCameraOnFlange says, in W, and the sheet's page is the flange.
+    X_WF.push_back(mounted == Mounted::kCamera ? pose_of(transform(X_WC) * transform(kCameraOnFlange).inverse())
+                                               : pose_of(transform(kCameraOnFlange) * transform(X_CB.back())));
+  }
+  const auto tags = views_of(X_CB);
+  std::vector<HandEyeView> views;
+  for (std::size_t i = 0; i < tags.size(); ++i) views.push_back({X_WF[i], tags[i]});
+  return views;
+}
+
+TEST(HandEye, RenderedViewsSayWhereTheCameraIsOnTheArmAndBesideIt) {
+  for (const Mounted mounted : {Mounted::kCamera, Mounted::kSheet}) {
+    const auto result = calibrate_hand_eye(distorting_camera(), hand_eye_views(mounted), mounted);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_LT(distance_between(result->X_camera, kCameraOnFlange), 0.001);
+    EXPECT_LT(rotation_between(result->X_camera, kCameraOnFlange), 0.1 * M_PI / 180);
+    EXPECT_LT(result->position_error, 0.001);
+  }
+}
+
+TEST(HandEye, WhatDoesNotSayEnoughIsRefused) {
+  const auto complaint = [](const std::vector<HandEyeView>& views) {
+    const auto result = calibrate_hand_eye(distorting_camera(), views, Mounted::kCamera);
+    return result ? std::string("nothing") : result.error().message;
+  };
+  const auto good = hand_eye_views(Mounted::kCamera);
+  EXPECT_THAT(complaint({good.begin(), good.begin() + 5}),
+              HasSubstr("got 5 of 5 with 4 tags or more, wanted at least 6"));
+  EXPECT_THAT(complaint(std::vector<HandEyeView>(6, good[0])), HasSubstr("turn the wrist left and right"));
+  auto mixed_up = good;
+  std::swap(mixed_up[1].X_WF, mixed_up[7].X_WF);
+  EXPECT_THAT(complaint(mixed_up), HasSubstr("is each pose that of its picture"));
 }
 
 }  // namespace

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <utility>
 
+#include "idl/text/json.hpp"
+
 namespace jostle::common {
 namespace {
 
@@ -59,7 +61,8 @@ Result<void> Journal::read(const json& origin) {
   }
   for (bool is_first = true; !text.empty(); is_first = false) {
     const std::size_t end = text.find('\n');
-    const json line = json::parse(text.substr(0, end), nullptr, false);
+    const auto line_result = parse_json(text.substr(0, end));
+    const json line = line_result ? *line_result : json();
     text.remove_prefix(end + 1);
     if (is_first) {
       if (!line.is_object() || !line.contains("origin"))

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "idl/text/json.hpp"
 #include "services/common/charts/plot.hpp"
 #include "services/common/charts/statistics.hpp"
 #include "services/common/process/command_line.hpp"
@@ -42,7 +43,10 @@ struct Measurements {
 Result<Measurements> read_measured(const std::filesystem::path& file) {
   auto text_result = common::read_text(file);
   if (!text_result) return text_result.error();
-  const nlohmann::json json = nlohmann::json::parse(*text_result, nullptr, false);
+  const auto json_result = parse_json(*text_result);
+  if (!json_result)
+    return Error{json_result.error().code, fmt::format("{}: {}", file.string(), json_result.error().message)};
+  const nlohmann::json& json = *json_result;
   try {
     Measurements found{.cores = json.at("provenance").at("cores").get<int>()};
     for (const nlohmann::json& row : json.at("results")) {

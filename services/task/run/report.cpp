@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "idl/text/json.hpp"
 #include "planners/execution/execution.hpp"
 #include "services/common/process/child_process.hpp"
 #include "services/common/process/exit_codes.hpp"
@@ -191,10 +192,10 @@ Result<void> leave_report(const RunOptions& options, const jostle_msgs::msg::Goa
   std::FILE* out = summary_of(options);
   if (result.report().empty() && !result.error().empty()) return {};
   fmt::print(out, "\n{}: {}\n", told(result.ending()).headline, result.reason());
-  json report = json::parse(result.report(), nullptr, false);
-  if (report.is_discarded()) {
-    return Error{Code::kInternal, "result: the coordinator's report is not JSON"};
-  }
+  auto report_result = parse_json(result.report());
+  if (!report_result)
+    return Error{Code::kInternal, "result: the coordinator's report: " + report_result.error().message};
+  json& report = *report_result;
   if (!result.error().empty()) {  // a part that failed is the reason, not what the coordinator was told to do then
     report["success"] = false;
     report["ending"] = planners::to_string(static_cast<planners::Ending>(result.ending()));

@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "idl/text/json.hpp"
+
 namespace jostle::tools {
 namespace {
 
@@ -45,10 +47,10 @@ std::optional<nlohmann::json> Line::hear(TimePoint deadline, std::stop_token sto
     if (size <= 0) return {};
     pending_.append(buffer, static_cast<std::size_t>(size));
   }
-  auto message = nlohmann::json::parse(pending_.substr(0, end), nullptr, false);
+  auto message_result = parse_json(std::string_view(pending_).substr(0, end));
   pending_.erase(0, end + 1);
-  if (!message.is_object()) return {};
-  return message;
+  if (!message_result || !message_result->is_object()) return {};
+  return std::move(message_result).value();
 }
 
 bool Line::say(const nlohmann::json& message) {

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "idl/text/json.hpp"
 #include "services/common/process/files.hpp"
 
 namespace jostle::tools {
@@ -69,10 +70,13 @@ class Reader {
 Result<Frames> load_frames(const std::filesystem::path& file) {
   const auto text_result = common::read_text(file);
   if (!text_result) return text_result.error();
+  const auto json_result = parse_json(*text_result);
+  if (!json_result)
+    return Error{json_result.error().code, fmt::format("{}: {}", file.string(), json_result.error().message)};
   try {
-    return Reader(file.string()).read(json::parse(*text_result));
+    return Reader(file.string()).read(*json_result);
   } catch (const json::exception& error) {
-    return Error{Code::kInvalidArgument, fmt::format("{}: not JSON: {}", file.string(), error.what())};
+    return Error{Code::kInvalidArgument, fmt::format("{}: {}", file.string(), error.what())};
   }
 }
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <span>
 
+#include "idl/text/json.hpp"
+
 namespace jostle::tools {
 namespace {
 
@@ -131,8 +133,10 @@ void put(std::span<std::uint8_t> place, T value) {
 }  // namespace
 
 Result<ViewRequest> parse_view_request(std::string_view text) {
-  const json object = json::parse(text, nullptr, false);
-  if (!object.is_object()) return invalid("request", object.is_discarded() ? "no JSON" : shown(object), "an object");
+  const auto object_result = parse_json(text);
+  if (!object_result) return Error{object_result.error().code, "request: " + object_result.error().message};
+  const json& object = *object_result;
+  if (!object.is_object()) return invalid("request", shown(object), "an object");
   const json& op = field(object, "op");
   if (op == "subscribe") return subscribe(object);
   if (op == "unsubscribe") return unsubscribe(object);

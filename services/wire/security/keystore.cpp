@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "idl/files/files.hpp"
+#include "idl/text/json.hpp"
 #include "services/wire/security/documents.hpp"
 #include "services/wire/security/pki.hpp"
 
@@ -108,10 +109,8 @@ std::string to_json(const std::vector<Record>& records) {
 std::time_t moment_of(const nlohmann::json& entry, const char* key) {
   constexpr std::time_t kLatest = 9'000'000'000;
   const nlohmann::json& value = entry.at(key);
-  // Its text only if it is short: what lies deep in itself cannot be written by recursion.
   if (!value.is_number_integer() || value.get<std::time_t>() < 0 || value.get<std::time_t>() > kLatest) {
-    const std::string got = value.is_number() ? value.dump() : value.type_name();
-    throw std::runtime_error(fmt::format("{}: got {}, wanted seconds, 0 to {}", key, got, kLatest));
+    throw std::runtime_error(fmt::format("{}: got {}, wanted seconds, 0 to {}", key, value.dump(), kLatest));
   }
   return value.get<std::time_t>();
 }
@@ -120,8 +119,13 @@ Result<std::vector<Record>> read_index(const fs::path& folder) {
   const fs::path file = folder / "ca" / "index.json";
   const auto text_result = files::read(file, files::kMostText);
   if (!text_result) return text_result.error();
+  const auto index_result = parse_json(*text_result);
+  if (!index_result) {
+    return Error{Code::kInvalidArgument,
+                 fmt::format("{}: got no index of a keystore: {}", file.string(), index_result.error().message)};
+  }
+  const nlohmann::json& index = *index_result;
   try {
-    const nlohmann::json index = nlohmann::json::parse(*text_result);
     std::vector<Record> records;
     for (const auto& entry : index.at("identities")) {
       const auto role = parse_role(entry.at("role").get<std::string>());

@@ -18,8 +18,10 @@ inline constexpr int kMostJsonDepth = 64;
 inline Result<nlohmann::json> parse_json(std::string_view text) {
   bool is_too_deep = false;
   try {
-    nlohmann::json value = nlohmann::json::parse(text, [&](int depth, auto, auto&) {
-      is_too_deep = is_too_deep || depth > kMostJsonDepth;
+    using Event = nlohmann::json::parse_event_t;
+    nlohmann::json value = nlohmann::json::parse(text, [&](int outer, Event event, const nlohmann::json&) {
+      const bool begins = event == Event::array_start || event == Event::object_start;
+      is_too_deep = is_too_deep || (begins && outer >= kMostJsonDepth);
       return !is_too_deep;
     });
     if (!is_too_deep) return value;

@@ -82,7 +82,7 @@ enum class Ending : std::uint8_t {
   kCancelled = 4,
   kBroken = 5,   ///< parts of the system failed
   kRefused = 6,  ///< never begun
-  kInvalid = 7   ///< never begun: the goal is malformed, or the world that runs is not its own
+  kInvalid = 7   ///< never begun: the goal is malformed, or for another scene than the world's
 };
 
 /// Returns words such as "succeeded" or "timed out".

@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using Uuid = RosActionClient::Uuid;
 
-constexpr Uuid kFirst{1, 2, 3}, kSecond{4, 5, 6}, kThird{7, 8, 9};
+constexpr Uuid kFirst{1, 2, 3}, kSecond{4, 5, 6}, kThird{7, 8, 9}, kFourth{10};
 
 class Actions : public RunFixture {
  protected:
@@ -108,6 +108,11 @@ TEST_F(Actions, AbortWhatCannotBeDoneAndSayWhatIsWrongWithIt) {
   asked = goal(plain);
   asked.execution_scene("[");
   EXPECT_THAT(wrong(grasp, kThird, asked), HasSubstr("goal.execution_scene"));
+  physics_pool::Scene other = three_objects();
+  other.objects.back().mass *= 2;
+  asked = goal(plain);
+  asked.execution_scene(physics_pool::to_yaml(other));
+  EXPECT_THAT(wrong(grasp, kFourth, asked), HasSubstr("got a world simulated in the scene of hash"));
   const auto unknown = result(grasp, grasp.ask_for_result({}));
   EXPECT_EQ(unknown.status(), status::STATUS_UNKNOWN);
 }

@@ -124,15 +124,16 @@ nlohmann::json rows(const ControlSequence& controls) {
 }
 
 // What the asker puts into result.json and draws; docs/results.md says what each key is. `seen`: as told to the
-// journal, entry i being what outcome.observed[i] was made of.
+// journal, entry i being what outcome.observed[i] was made of. `world`: Link::scene().
 std::string report_of(const planners::Outcome& outcome, const Task& task, std::uint64_t seed, const Shares& used,
-                      const std::vector<jostle_msgs::msg::Observation>& seen) {
+                      const std::vector<jostle_msgs::msg::Observation>& seen, const std::string& world) {
   const planners::Plan& plan = outcome.first_plan;
   const bool has_plan = plan.controls.steps() > 0;
   nlohmann::json report{{"success", outcome.success},
                         {"ending", to_string(outcome.ending)},
                         {"reason", outcome.reason},
                         {"scene_hash", to_string(physics_pool::scene_hash(task.execution_scene()))},
+                        {"world_scene_hash", world.empty() ? nlohmann::json() : nlohmann::json(world)},
                         {"seed", seed},
                         {"plan_hash", has_plan ? nlohmann::json(to_string(hash_of(plan.controls.values))) : nullptr},
                         {"cost", has_plan ? nlohmann::json(plan.cost) : nullptr},
@@ -206,8 +207,8 @@ void Coordinator::cancel(const std::string& goal_id) {
 void Coordinator::run(std::stop_token stop) {
   const std::jthread ticker([this](std::stop_token own) { publish_feedback(own); });
   while (!stop.stop_requested()) {
-    auto goal = goals_.take(steady_clock::now() + std::chrono::seconds(1), stop);
-    if (goal && !stop.stop_requested()) serve(*goal, stop);
+    const auto letter = goals_.take_letter(steady_clock::now() + std::chrono::seconds(1), stop);
+    if (letter && !stop.stop_requested()) serve(letter->sample, letter->writer == participant_.id(), stop);
   }
   // What a reader has not yet received would be lost with this process: a recorder's bag would have no end.
   const auto deadline = steady_clock::now() + kLastWords;
@@ -216,7 +217,7 @@ void Coordinator::run(std::stop_token stop) {
   result_writer_.wait_until_received(deadline);
 }
 
-void Coordinator::serve(const Goal& goal, std::stop_token stop) {
+void Coordinator::serve(const Goal& goal, bool is_action, std::stop_token stop) {
   std::stop_token cancelled;
   {
     const std::lock_guard lock(mutex_);
@@ -251,8 +252,9 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
   std::optional<Link> link;
   Performance done;
   if (task_result) {
-    link.emplace(participant_, world::WorldClientOptions{.scene = scene_hash(task_result->execution_scene())});
-    done = perform(goal, *task_result, *link, cancelled);
+    const Hash scene = scene_hash(task_result->execution_scene());
+    done.ended = is_action ? check_world(link.emplace(participant_), scene, cancelled) : Result<void>();
+    if (done.ended) done = perform(goal, *task_result, link ? *link : link.emplace(participant_), cancelled);
   } else {
     done.ended = task_result.error();
   }
@@ -260,8 +262,8 @@ void Coordinator::serve(const Goal& goal, std::stop_token stop) {
     result.ending(on_the_wire(done.outcome->ending));
     result.success(done.outcome->success);
     result.reason(done.outcome->reason);
-    result.report(
-        report_of(*done.outcome, *task_result, goal.seed(), since(before, shares_of(pool_.status())), done.seen));
+    result.report(report_of(*done.outcome, *task_result, goal.seed(), since(before, shares_of(pool_.status())),
+                            done.seen, link->scene()));
   }
   if (!done.ended) {
     const Error& error = done.ended.error();
@@ -297,6 +299,12 @@ void Coordinator::answer(const jostle_msgs::msg::GoalResult& result, std::stop_t
   }
 }
 
+// Whoever sends an action cannot hear what the world says of itself.
+Result<void> Coordinator::check_world(Link& link, const Hash& scene, std::stop_token stop) {
+  if (auto reading_result = link.robot.read(std::move(stop)); !reading_result) return reading_result.error();
+  return world::check_scene(link.scene(), scene);
+}
+
 Coordinator::Performance Coordinator::perform(const Goal& goal, Task& task, Link& link, std::stop_token stop) {
   const physics_pool::TaskGeometry& geometry = task.geometry();
   const std::string goal_text = fmt::format("goal {}: ", shown(goal.goal_id()));
@@ -320,6 +328,9 @@ Coordinator::Performance Coordinator::perform(const Goal& goal, Task& task, Link
                           world_time_ = world::seconds(news.header());
                         }
                         performance.seen.push_back(news);
+                        if (news.number() > 0) return;
+                        if (auto ok = world::check_scene(link.scene(), scene_hash(task.execution_scene())); !ok)
+                          spdlog::warn("{}{}", goal_text, ok.error().message);
                       },
                   .on_plan =
                       [&](const jostle_msgs::msg::Plan& plan) {

@@ -72,13 +72,16 @@ class Coordinator {
 
   // The world of one goal, as the wire shows it.
   struct Link {
-    Link(const wire::Participant& participant, const world::WorldClientOptions& options)
-        : robot(participant, options), objects(participant, robot, options) {}
+    explicit Link(const wire::Participant& participant) : robot(participant), objects(participant, robot) {}
+    // Of which scene the world is that was heard; empty: a real one, or none was heard yet.
+    const std::string& scene() const { return robot.scene().empty() ? objects.scene() : robot.scene(); }
     world::RobotClient robot;
     world::ObjectsClient objects;
   };
+  Result<void> check_world(Link& link, const Hash& scene, std::stop_token stop);
   Performance perform(const Goal& goal, Task& task, Link& link, std::stop_token stop);
-  void serve(const Goal& goal, std::stop_token stop);
+  // `is_action`: it came as one.
+  void serve(const Goal& goal, bool is_action, std::stop_token stop);
   void answer(const jostle_msgs::msg::GoalResult& result, std::stop_token stop);
   void refuse_goals_meanwhile(std::stop_token stop);
   void publish_feedback(std::stop_token stop);

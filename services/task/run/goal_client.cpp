@@ -31,7 +31,10 @@ void GoalClient::listen() {
     if (std::exchange(trouble_, feedback.trouble()) == feedback.trouble() || trouble_.empty()) continue;
     if (listener_.on_notice) listener_.on_notice(trouble_);
   }
-  if (!world_.take_all().empty()) world_heard_ = Clock::now();
+  const auto statuses = world_.take_all();
+  if (statuses.empty()) return;
+  world_heard_ = Clock::now();
+  world_scene_ = statuses.back().scene();
 }
 
 void GoalClient::note_work(const jostle_msgs::msg::Feedback& feedback) {

@@ -42,6 +42,8 @@ class GoalClient {
   /// When a coordinator, or a world, was heard last.
   std::optional<Clock::time_point> coordinator_heard() const { return coordinator_heard_; }
   std::optional<Clock::time_point> world_heard() const { return world_heard_; }
+  /// Returns of which scene the world is that was heard last (RobotStatus.scene); empty: a real one, or none.
+  const std::string& world_scene() const { return world_scene_; }
   /// When a coordinator was heard last that works for somebody else.
   std::optional<Clock::time_point> others_heard() const { return others_heard_; }
 
@@ -74,6 +76,7 @@ class GoalClient {
   bool sent_ = false;
   std::uint64_t coordinator_ = 0;  // its participant, once the goal was sent
   std::string trouble_;            // the coordinator's newest
+  std::string world_scene_;
   std::optional<Clock::time_point> coordinator_heard_, world_heard_, others_heard_;
   std::optional<Clock::time_point> idle_since_;  // the coordinator, as far as this goal is concerned
   bool taken_up_ = false;                        // the coordinator spoke of the goal

@@ -9,6 +9,7 @@
 #include "services/task/run/display.hpp"
 #include "services/task/run/goal_client.hpp"
 #include "services/task/run/report.hpp"
+#include "services/world/link/messages.hpp"
 
 namespace {
 
@@ -35,7 +36,10 @@ Result<void> send(GoalClient& client, const RunOptions& options, const wire::Par
     client.listen();
     const std::vector<std::uint64_t> found = client.coordinators();
     const bool answers = found.size() == 1 && client.reaches(found.front());
-    if (answers && client.world_heard() && client.send(make_goal(options), found.front())) return {};
+    if (answers && client.world_heard()) {
+      if (auto ok = world::check_scene(client.world_scene(), scene_hash(options.scene)); !ok) return ok;
+      if (client.send(make_goal(options), found.front())) return {};
+    }
     if (!common::pause_until(Clock::now() + kTick, stop)) return Error{Code::kCancelled, "interrupted"};
     if (Clock::now() < deadline) continue;
     if (found.size() > 1) {
@@ -94,15 +98,12 @@ int perform(const RunOptions& options, double patience, std::stop_token stop) {
   GoalClient client(*participant_result, fmt::format("goal-{:016x}", participant_result->id()),
                     {.on_feedback = [&](const auto& feedback) { display.show(feedback); },
                      .on_notice = [&](const std::string& text) { line.say("{}", text); }});
-  const auto code_of = [](const Error& error) {
-    return error.code == Code::kCancelled ? common::kExitInterrupted : common::kExitBroken;
-  };
   if (auto ok = send(client, options, *participant_result, patience, stop); !ok) {
-    return fail(ok.error(), code_of(ok.error()));
+    return fail(ok.error(), common::exit_code_of(ok.error()));
   }
   auto result = follow(client, line, std::move(stop));
   line.finish();
-  if (!result) return fail(result.error(), code_of(result.error()));
+  if (!result) return fail(result.error(), common::exit_code_of(result.error()));
   if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), common::kExitBroken);
   const int code = exit_code_of(*result);
   const std::string error = error_of(*result);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "idl/msg/ros.h"
+#include "services/common/process/trouble.hpp"
 
 namespace jostle::world {
 namespace {
@@ -157,6 +158,16 @@ tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates&
     message.transforms().push_back(std::move(transform));
   }
   return message;
+}
+
+Result<void> check_scene(const std::string& simulated, const Hash& wanted) {
+  if (simulated.empty() || simulated == to_string(wanted)) return {};
+  return Error{
+      Code::kUnknownWorld,
+      fmt::format("got a world simulated in the scene of hash {}, wanted {}: plans would be made for other things "
+                  "than are there; give the scene file that the world was started with (`jostle scene check "
+                  "FILE` prints its hash), or start the world with this one",
+                  common::shown(simulated, 32), to_string(wanted))};
 }
 
 jostle_msgs::msg::VelocityCommand stop_message(std::uint64_t epoch, std::uint64_t sequence_number) {

@@ -10,6 +10,7 @@
 
 #include "idl/msg/robot.h"
 #include "idl/msg/task.h"
+#include "idl/types/hash.hpp"
 #include "idl/types/result.hpp"
 #include "idl/types/state.hpp"
 #include "perception/api/object_source.hpp"
@@ -31,6 +32,10 @@ Result<std::vector<perception::ObjectReading>> from_message(const jostle_msgs::m
 sensor_msgs::msg::JointState joint_state_message(const StateLayout& layout, const State& x, double time);
 geometry_msgs::msg::PoseArray pose_array_message(const jostle_msgs::msg::ObjectStates& objects);
 tf2_msgs::msg::TFMessage transform_message(const jostle_msgs::msg::ObjectStates& objects);
+
+/// Compares what a world says of itself (RobotStatus.scene; empty: a real one, or not heard yet) with scene_hash() of
+/// the scene that plans are made for. Error kUnknownWorld: it is another one; with both hashes and the remedy.
+Result<void> check_scene(const std::string& simulated, const Hash& wanted);
 
 /// Makes the message that ends the command at work, and those of its commander that wait (robot.idl).
 jostle_msgs::msg::VelocityCommand stop_message(std::uint64_t epoch, std::uint64_t sequence_number);

@@ -24,17 +24,6 @@ Error silent(const char* who, const std::string& topic, std::chrono::millisecond
                               who, topic, time.count() / 1e3)};
 }
 
-// `simulated`: as the world says it; empty for a real one.
-Result<void> check_scene(const std::string& topic, const std::string& simulated, const Hash& wanted) {
-  if (simulated.empty() || wanted.empty() || simulated == to_string(wanted)) return {};
-  return Error{
-      Code::kUnknownWorld,
-      fmt::format("{}: got a world simulated in the scene of hash {}, wanted {}: the plan would be made for other "
-                  "things than are there; give the scene file that the world was started with (`jostle scene "
-                  "check FILE` prints its hash), or start the world with this one",
-                  topic, common::shown(simulated, 32), to_string(wanted))};
-}
-
 }  // namespace
 
 RobotClient::RobotClient(const wire::Participant& participant, const WorldClientOptions& options)
@@ -72,11 +61,6 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::chrono::mill
                     wire::topics::kRobotStatus.name, letter->writer, *robot_);
       continue;
     }
-    if (auto ok = check_scene(wire::topics::kRobotStatus.name, status.scene(), options_.scene); !ok) {
-      if (robot_ == letter->writer) return ok.error();
-      reject(ok.error());  // it may be a stranger's
-      continue;
-    }
     if (auto reading_result = from_message(status); !reading_result) {
       reject({Code::kInvalidArgument, wire::topics::kRobotStatus.name + ": " + reading_result.error().message});
       continue;
@@ -89,6 +73,7 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::chrono::mill
     heard_ = true;
     limits_ = status.limits();
     time_ = seconds(status.header());
+    scene_ = status.scene();
     return std::move(status);
   }
 }
@@ -229,14 +214,11 @@ Result<std::vector<perception::ObjectReading>> ObjectsClient::read() {
                     wire::topics::kObjectStates.name, letter->writer, *robot);
       continue;
     }
-    if (auto ok = check_scene(wire::topics::kObjectStates.name, letter->sample.scene(), options_.scene); !ok) {
-      reject(ok.error());
-      continue;
-    }
     auto readings_result = from_message(letter->sample);
     if (readings_result) {
       newest_ = std::move(readings_result).value();
       time_ = seconds(letter->sample.header());
+      scene_ = letter->sample.scene();
     } else {
       reject({Code::kInvalidArgument, wire::topics::kObjectStates.name + ": " + readings_result.error().message});
     }

@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "idl/types/hash.hpp"
 #include "perception/api/object_source.hpp"
 #include "robot_bridge/api/robot.hpp"
 #include "services/common/process/trouble.hpp"
@@ -22,9 +21,6 @@
 namespace jostle::world {
 
 struct WorldClientOptions {
-  /// scene_hash() of the scene that plans are made for. Of a world that is simulated, it must be this one; a real one
-  /// says of none. Empty: any will do.
-  Hash scene;
   /// A robot or a world that something waits for, and that is not heard for this long, is reported as gone. Shorter,
   /// and one that is only slow, on a machine whose workers take all cores, is taken for dead.
   std::chrono::milliseconds silence{5000};
@@ -39,7 +35,7 @@ struct WorldClientOptions {
 /// Bad statuses are counted, reported and skipped; only if nothing good follows
 /// are they an error. The robot is the participant that speaks and reads our commands; what others say
 /// of it is dropped and counted. That it obeys another commander, or does not take a command, is an
-/// error, too. So is a world of another scene: kUnknownWorld.
+/// error, too.
 class RobotClient final : public robot_bridge::Robot {
  public:
   RobotClient(const wire::Participant& participant, const WorldClientOptions& options = {});
@@ -50,6 +46,9 @@ class RobotClient final : public robot_bridge::Robot {
 
   /// Returns the time stamp of the newest status, s of the world's clock.
   double time() const { return time_; }
+
+  /// Returns RobotStatus.scene of the newest status: empty before the first, and of a real world.
+  const std::string& scene() const { return scene_; }
 
   /// Returns Participant::id() of the robot, once it was heard.
   std::optional<std::uint64_t> participant() const { return robot_; }
@@ -86,6 +85,7 @@ class RobotClient final : public robot_bridge::Robot {
   std::vector<double> limits_;  // per axis, of the newest status
   bool known_ = false;          // a status has named our epoch
   double time_ = 0.0;
+  std::string scene_;
   common::Trouble rejected_{"bad statuses"};
   common::Trouble foreign_{"statuses of others"};
 };
@@ -93,13 +93,15 @@ class RobotClient final : public robot_bridge::Robot {
 /// Reads object states from `rt/objects/states`, never older than the robot's newest
 /// status, so that both describe one moment. Where the robot's participant speaks of objects,
 /// as a simulated world does, nobody else is listened to. Bad measurements are counted,
-/// reported and skipped; only if nothing good follows are they an error. Those of another scene are an error,
-/// kUnknownWorld.
+/// reported and skipped; only if nothing good follows are they an error.
 class ObjectsClient final : public perception::ObjectSource {
  public:
   ObjectsClient(const wire::Participant& participant, const RobotClient& robot, const WorldClientOptions& options = {});
 
   Result<std::vector<perception::ObjectReading>> read() override;
+
+  /// Returns ObjectStates.scene of the newest measurement, as RobotClient::scene().
+  const std::string& scene() const { return scene_; }
 
   std::uint64_t rejected() const { return rejected_.count(); }
 
@@ -109,6 +111,7 @@ class ObjectsClient final : public perception::ObjectSource {
   wire::Inbox<jostle_msgs::msg::ObjectStates> states_;
   std::vector<perception::ObjectReading> newest_;
   double time_ = -1.0;  // s, stamp of newest_; before the first: none
+  std::string scene_;
   common::Trouble rejected_{"bad measurements"};
   common::Trouble foreign_{"measurements of others"};
 };

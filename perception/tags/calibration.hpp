@@ -64,8 +64,8 @@ struct HandEye {
 
 /// Finds where a camera is on an arm, or beside one that shows it the sheet, by OpenCV's calibrateHandEye (Park and
 /// Martin, "Robot Sensor Calibration: Solving AX = XB on the Euclidean Group", TRA 1994).
-/// Error kInvalidArgument, with the remedy: fewer than 6 views with 4 tags, a flange that turned by less than 20 degrees,
-/// or about one axis alone, or poses that do not fit the pictures (more than 5 mm or 1 degree).
+/// Error kInvalidArgument, with the remedy: fewer than 6 views with 4 tags, a flange that turned by less than 20
+/// degrees, or about one axis alone, or poses that do not fit the pictures (more than 5 mm or 1 degree).
 Result<HandEye> calibrate_hand_eye(const Camera& camera, std::span<const HandEyeView> views, Mounted mounted);
 
 }  // namespace jostle::perception

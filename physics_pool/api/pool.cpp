@@ -29,7 +29,7 @@ Result<std::vector<BatchReply>> AsyncPool::run_all(std::span<const RolloutBatch>
                                                    std::stop_token stop) {
   const Error cancelled{Code::kCancelled, "batch: cancelled by its caller"};
   if (stop.stop_requested()) return cancelled;  // however short the batch is
-  std::mutex mutex;  // guards missing, failure and replies
+  std::mutex mutex;                             // guards missing, failure and replies
   std::condition_variable_any arrived;
   std::size_t missing = batches.size();
   std::optional<Error> failure;

@@ -53,7 +53,9 @@ TEST_F(Robots, ARobotThatThereIsNotIsRefusedWithThePlacesLookedAt) {
                    "  - {name: a, size: [0.04, 0.05, 0.06], mass: 0.5, friction: 0.4, pose: {x: 0, y: 0}}\n"
                    "task: {kind: reach, target: a}\n");
   EXPECT_EQ(ends("jostle_scene", {"check", scene}), 2);
-  EXPECT_THAT(err, HasSubstr("wrong.yaml:2: robot.model: got 'seven_axes', wanted planar_gripper, pusher, ur5_2f85, or a file"));
+  EXPECT_THAT(
+      err,
+      HasSubstr("wrong.yaml:2: robot.model: got 'seven_axes', wanted planar_gripper, pusher, ur5_2f85, or a file"));
   EXPECT_THAT(err, HasSubstr(folder.path().string()));
 }
 

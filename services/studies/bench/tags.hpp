@@ -20,8 +20,8 @@ struct TagsOptions {
 
 /// Renders frames of 1280x720 with 15 tags of 50 mm, tilted by up to 60 degrees, at 0.6, 0.9 and 1.4 m; finds the tags
 /// and their poses with our settings, with ours at full resolution, and with libapriltag's own, in turns; then the
-/// same tags with our settings in ten images more, of which the estimator makes one estimate. Prints how far all of them
-/// are from the truth. Errors   kCancelled, kIo
+/// same tags with our settings in ten images more, of which the estimator makes one estimate. Prints how far all of
+/// them are from the truth. Errors   kCancelled, kIo
 Result<void> bench_tags(const TagsOptions& options);
 
 }  // namespace jostle::studies

@@ -46,6 +46,16 @@ TEST(TagPose, TheOtherMinimumIsTiltedTheOtherWayAndFitsLessWell) {
 }
 
 // Chi-squared of 6 degrees: what is drawn with the covariance's own sigma must be in its ellipsoids.
+// -2 log of the ratio of likelihoods of four corners; noise is never taken for less than it is in rendered images.
+TEST(TagPose, SurpriseIsThatOfTheCorners) {
+  PoseEstimate estimate;
+  estimate.best.error_px = 0.0;
+  EXPECT_EQ(surprise_of(estimate.best, estimate), 0.0);
+  EXPECT_NEAR(surprise_of({.X_CB = {}, .error_px = 2 * kCornerSigma}, estimate), 4 * 4.0, 1e-9);
+  estimate.best.error_px = 0.5;
+  EXPECT_NEAR(surprise_of({.X_CB = {}, .error_px = 1.0}, estimate), 4 * (1.0 - 0.25) / 0.25, 1e-9);
+}
+
 TEST(TagPose, CovarianceIsThatOfNoisyCorners) {
   const Camera camera = distorting_camera();
   std::mt19937_64 random(3);

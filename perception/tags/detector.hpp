@@ -41,8 +41,8 @@ class Detector {
   Detector& operator=(Detector&&) noexcept;
   ~Detector();
 
-  /// Returns the tags in an image, by id. One that shows twice is there twice. None in an image with a side of less than
-  /// 10 decimation pixels: libapriltag 3.3 crashes in small ones.
+  /// Returns the tags in an image, by id. One that shows twice is there twice. None in an image with a side of less
+  /// than 10 decimation pixels: libapriltag 3.3 crashes in small ones.
   std::vector<Detection> detect(const GreyImage& image);
 
  private:

@@ -9,7 +9,6 @@
 #include <mutex>
 #include <numbers>
 #include <optional>
-#include <ranges>
 #include <set>
 
 #include "idl/text/nearest.hpp"
@@ -344,9 +343,10 @@ class Inspection {
         add_relative({"task.kind", "task.kind"}, misfit);
     }
     if (scene_.target() < 0) {
-      add_relative({"task.target", "task.target"},
-                   fmt::format("got '{}', wanted the name of an object{}", task.target,
-                               did_you_mean(task.target, std::views::transform(scene_.objects, &SceneObject::name))));
+      std::vector<std::string> names;
+      for (const SceneObject& object : scene_.objects) names.push_back(object.name);
+      add_relative({"task.target", "task.target"}, fmt::format("got '{}', wanted the name of an object{}", task.target,
+                                                               did_you_mean(task.target, names)));
     }
     if (kind && kind->has_goal) check_disc("task.goal", task.goal);
     if (task.obstacle) check_disc("task.obstacle", *task.obstacle);

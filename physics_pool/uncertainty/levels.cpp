@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <ranges>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "idl/text/nearest.hpp"
 
@@ -22,8 +23,10 @@ Result<Uncertainty> parse_uncertainty(std::string_view word) {
   for (const auto& [name, level] : kLevels) {
     if (word == name) return level;
   }
+  std::vector<std::string> known;
+  for (const auto& [name, level] : kLevels) known.emplace_back(name);
   return Error{Code::kInvalidArgument, fmt::format("uncertainty: got '{}', wanted none, low, medium or high{}", word,
-                                                   did_you_mean(word, std::views::keys(kLevels)))};
+                                                   did_you_mean(word, known))};
 }
 
 const char* to_string(Uncertainty level) { return kLevels[static_cast<std::size_t>(level)].first; }

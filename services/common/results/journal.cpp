@@ -104,8 +104,8 @@ std::string first_difference(const json& got, const json& wanted, const std::str
     for (const auto& [key, value] : side->items()) keys.insert(key);
   }
   for (const std::string& key : keys) {
-    const std::string inner = where.empty() ? key : where + "." + key;
-    const std::string difference = first_difference(got.value(key, json()), wanted.value(key, json()), inner);
+    const std::string inner = where.empty() ? key : fmt::format("{}.{}", where, key);
+    std::string difference = first_difference(got.value(key, json()), wanted.value(key, json()), inner);
     if (!difference.empty()) return difference;
   }
   return "";

@@ -23,7 +23,6 @@ namespace {
 
 using nlohmann::json;
 using physics_pool::Inspection;
-using physics_pool::Scene;
 
 constexpr std::uint32_t kStream = 0xa4e;
 constexpr int kReachesPerShelf = 10;

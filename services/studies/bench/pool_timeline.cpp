@@ -233,7 +233,7 @@ Result<void> bench_pool(const PoolTimelineOptions& options) {
   if (options.urgent) batches.back().priority = physics_pool::Priority::kUrgent;
   if (auto ok = run_all(pools, batches, 1, options); !ok) return ok;  // worlds are compiled, caches warm
   const auto start = std::chrono::steady_clock::now();
-  const auto ran = run_all(pools, batches, options.batches, options);
+  auto ran = run_all(pools, batches, options.batches, options);
   const auto traces = recorder.since(start);
   if (!ran && (ran.error().code != Code::kCancelled || traces.empty())) return ran;
 

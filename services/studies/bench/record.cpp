@@ -350,7 +350,7 @@ Result<void> measure_all(const RecordBenchOptions& options, const fs::path& fold
 Result<void> measure(const RecordBenchOptions& options, const fs::path& folder) {
   if (options.pairs > 0) return disturbance(options, folder);
   json all;
-  const auto measured = measure_all(options, folder, all);
+  auto measured = measure_all(options, folder, all);
   options.line->end();
   if (all.contains("pace")) print_pace(all["pace"]);
   for (const auto& [name, key] : {std::pair{"bare append loop", "bare_loop"}, std::pair{"bag loop", "bag_loop"},

@@ -129,14 +129,15 @@ TEST_F(BadInput, MisspeltWordsAreToldWithTheOneThatWasMeant) {
   expect_refused({easy, "--uncertainty", "mediun"}, {"did you mean medium?"});
   expect_refused({easy, "--controller", "orr"}, {"did you mean or?"});
   expect_refused({easy, "--predictor", "course"}, {"did you mean coarse?"});
-  expect_refused({easy, "--predictor", "coarse,kinematics"},
+  const std::string push = folder.write("push.yaml", physics_pool::to_yaml(push_ahead()));
+  expect_refused({push, "--predictor", "coarse,kinematics"},
                  {"wanted kinematic, limit-surface, planar, learned or", "did you mean kinematic?"});
   expect_refused({scene_file([](physics_pool::Scene& s) { s.task.target = "targe"; })}, {"did you mean target?"});
-  const std::string scene = contents(easy);
-  const std::size_t at = scene.find("planar_gripper");
-  ASSERT_NE(at, std::string::npos);
-  expect_refused({folder.write("robot.yaml", scene.substr(0, at) + "planar_griper" + scene.substr(at + 14))},
-                 {"wanted planar_gripper, pusher, ur5_2f85", "did you mean planar_gripper?"});
+  const std::string robot =
+      folder.write("robot.yaml",
+                   "jostle_scene: 2\nname: robot\nsurface: {parts: [{x: 0, y: 0, size: [1, 1]}]}\n"
+                   "robot: {model: planar_griper}\nobjects: []\ntask: {kind: grasp, target: can}\n");
+  expect_refused({robot}, {"wanted planar_gripper, pusher, ur5_2f85", "did you mean planar_gripper?"});
 }
 
 TEST_F(BadInput, ArmIsRefusedForARobotThatItDoesNotMove) {

@@ -333,6 +333,35 @@ TEST_F(SimulatedWorldProcess, SaysThatItsGripperIsEmpty) {
   EXPECT_EQ(status->in_hand(), RobotStatus_Constants::EMPTY);
 }
 
+// It says much and obeys nobody, and was heard first.
+TEST_F(WorldLink, APlaybackBesideAWorldIsNotTakenForIt) {
+  RobotStatus played;
+  played.q({9, 9, 9, 9, 9});
+  ObjectStates played_objects = world::to_message({{.name = "played", .orientation = {1, 0, 0, 0}}}, 0.5);
+  const auto player = wire::Participant::open({.domain = domain}).value();
+  wire::Writer<RobotStatus> played_status(player, wire::topics::kRobotStatus);
+  wire::Writer<ObjectStates> played_states(player, wire::topics::kObjectStates);
+  RobotClient robot(participant, {.start = kPatience});
+  ObjectsClient objects(participant, robot, {.start = kPatience});
+  ASSERT_TRUE(played_status.wait_for_readers(deadline()));
+  ASSERT_TRUE(played_states.wait_for_readers(deadline()));
+  const std::jthread speaker([&](std::stop_token stop) {
+    soon(kPatience, [&] {
+      (void)played_states.write(played_objects);
+      return !played_status.write(played) || stop.stop_requested();
+    });
+  });
+  const auto sim = program("jostle_sim", {easy});
+
+  const auto robot_result = robot.read();
+  const auto objects_result = objects.read();
+
+  ASSERT_TRUE(robot_result) << robot_result.error().message;
+  EXPECT_NE(robot_result->q.front(), 9.0);
+  ASSERT_TRUE(objects_result) << objects_result.error().message;
+  EXPECT_NE(objects_result->front().name, "played");
+}
+
 TEST_F(WorldLink, PusherSaysThatItCannotTellWhatIsInItsHand) {
   const auto scene = folder.write("push.yaml", physics_pool::to_yaml(push_ahead()));
   const auto sim = program("jostle_sim", {scene});

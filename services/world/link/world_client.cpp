@@ -37,7 +37,10 @@ RobotClient::RobotClient(const wire::Participant& participant, const WorldClient
 bool RobotClient::is_robot(std::uint64_t writer) {
   const bool there = robot_ && status_.hears(*robot_);
   if (robot_ != writer && !there && sequence_number_ == 0 && command_.reaches(writer)) robot_ = writer;
-  return robot_ == writer || !robot_;
+  if (robot_) return robot_ == writer;
+  // A playback speaks of a robot, and obeys nobody. It is believed if no robot is found beside it.
+  if (!strangers_since_) strangers_since_ = steady_clock::now();
+  return steady_clock::now() - *strangers_since_ > options_.start / 2;
 }
 
 Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::chrono::milliseconds patience,
@@ -57,6 +60,7 @@ Result<jostle_msgs::msg::RobotStatus> RobotClient::next_status(std::chrono::mill
     }
     jostle_msgs::msg::RobotStatus& status = letter->sample;
     if (!is_robot(letter->writer)) {
+      if (!robot_) continue;
       foreign_.warn("{}: a status of participant {:016x} was dropped: the robot is participant {:016x}",
                     wire::topics::kRobotStatus.name, letter->writer, *robot_);
       continue;

@@ -34,7 +34,8 @@ struct WorldClientOptions {
 /// request is passed on, and answered with kCancelled once the robot says that it obeyed.
 /// Bad statuses are counted, reported and skipped; only if nothing good follows
 /// are they an error. The robot is the participant that speaks and reads our commands; what others say
-/// of it is dropped and counted. That it obeys another commander, or does not take a command, is an
+/// of it is dropped and counted. As long as nobody who speaks reads them, such as a playback, it is waited for a robot
+/// that does, for half of WorldClientOptions::start. That it obeys another commander, or does not take a command, is an
 /// error, too.
 class RobotClient final : public robot_bridge::Robot {
  public:
@@ -81,6 +82,7 @@ class RobotClient final : public robot_bridge::Robot {
   std::chrono::steady_clock::time_point idle_since_{};  // the robot, while a command of ours should be at work
   std::string refusal_;                 // the last one heard; it is repeated until the next good command
   std::optional<std::uint64_t> robot_;  // its participant
+  std::optional<std::chrono::steady_clock::time_point> strangers_since_;  // statuses of who does not read our commands
   bool heard_ = false;
   std::vector<double> limits_;  // per axis, of the newest status
   bool known_ = false;          // a status has named our epoch

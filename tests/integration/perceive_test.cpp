@@ -105,7 +105,7 @@ TEST_F(DoctorOfEyes, SaysThatNobodyIsThere) {
 TEST_F(DoctorOfEyes, NamesTheTagsThatACameraSees) {
   const auto arm = program("jostle_ur_sim", {easy, "--camera", "--address", fmt::format("127.0.1.{}", domain + 1)});
   ASSERT_TRUE(arm->says("ready", kPatience)) << arm->err();
-  ask({"--json", "--camera", "camera"});
+  ask({"--json", "--camera", "/camera"});  // as users of ROS 2 write it
   EXPECT_THAT(said["camera"], HasSubstr("images per second of")) << arm->err();
   EXPECT_THAT(said["intrinsics"], StartsWith("ok: focal length"));
   EXPECT_THAT(said["tags"], StartsWith("ok: "));

@@ -41,7 +41,9 @@ int perform(const RunOptions& options, std::stop_token stop) {
   }
   const auto recorded = (*session_result)->finish_recording();
   session_result->reset();  // before drawing: every process it started is gone
-  if (auto ok = leave_report(options, *result); !ok) return fail(ok.error(), common::kExitBroken);
+  RunOptions told = options;
+  if (!recorded) told.record.clear();  // it is no bag to be replayed
+  if (auto ok = leave_report(told, *result); !ok) return fail(ok.error(), common::kExitBroken);
   if (!recorded) return fail(recorded.error(), common::kExitBroken);
   const int code = exit_code_of(*result);
   const std::string error = error_of(*result);

@@ -55,7 +55,8 @@ void add_goal_options(CLI::App& app, GoalArguments& arguments, RunOptions& optio
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   app.add_option("--timeout", arguments.parameters.timeout,
-                 "Seconds for planning and acting together, the same as --set control.timeout=… (default: 900)");
+                 "Seconds for planning and acting together, the same as --set control.timeout=…\n(default: 900; of "
+                 "tampc, uampc and slow-mpc 180)");
   app.add_option("--json", options.json, "File for the result; docs/results.md says what its keys are");
   app.add_option("--picture", options.picture, "PNG of the execution");
   app.add_flag("--plan-only", options.plan_only, "Stop after the first plan");

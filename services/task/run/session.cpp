@@ -126,10 +126,16 @@ Result<void> Session::finish_recording() {
 Result<void> Session::check_recording() const {
   const auto text_result = common::read_text(folder_ / "record.json");
   const auto report = nlohmann::json::parse(text_result ? *text_result : "", nullptr, false);
+  if (report.is_discarded()) {
+    const std::string bag = options_.record.string();
+    return Error{
+        Code::kIo,
+        fmt::format("the recording {} is not complete: its recorder did not end in an orderly way; `jostle bag "
+                    "recover {}` keeps what it has",
+                    bag, bag)};
+  }
   std::vector<std::string> gaps;
-  if (report.is_discarded()) gaps.emplace_back("its recorder did not end in an orderly way");
   for (const auto& [topic, heard] : witness_.counts()) {
-    if (report.is_discarded()) break;
     const std::uint64_t recorded = report["messages"].value(topic, std::uint64_t{0});
     const std::uint64_t lost = report["lost"].value(topic, std::uint64_t{0});
     if (recorded < heard) gaps.push_back(fmt::format("{} of {} messages of {}", heard - recorded, heard, topic));

@@ -127,7 +127,7 @@ Images listen(const wire::Participant& participant, const std::string& name) {
 }
 
 Check images_of(const Images& seen, const std::string& name) {
-  const std::string topic = fmt::format("/{}/image_raw", name);
+  const std::string topic = fmt::format("{}{}/image_raw", name.starts_with('/') ? "" : "/", name);
   if (seen.count == 0) {
     return {"camera", Verdict::kFail, fmt::format("no image on {} for {} s", topic, kPatience.count()),
             "start the camera's ROS 2 driver on the same ROS_DOMAIN_ID, and name what stands before /image_raw"};
@@ -149,7 +149,7 @@ Check images_of(const Images& seen, const std::string& name) {
 }
 
 Check intrinsics_of(const Images& seen, const std::string& name) {
-  const std::string topic = fmt::format("/{}/camera_info", name);
+  const std::string topic = fmt::format("{}{}/camera_info", name.starts_with('/') ? "" : "/", name);
   const std::string calibrate = fmt::format("`jostle calibrate camera`, and give its file to the driver: {}", kPage);
   if (!seen.info) return {"intrinsics", Verdict::kFail, fmt::format("none on {}", topic), calibrate};
   const auto camera_result = world::from_message(*seen.info);

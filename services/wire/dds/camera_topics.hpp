@@ -19,12 +19,12 @@ struct SerializerOf<sensor_msgs::msg::CameraInfo> {
 /// An image of a megabyte in many datagrams: one that is lost is sent again, and nobody wants yesterday's.
 inline constexpr Qos kImages{.depth = 2};
 
-/// Returns the topics of the camera whose images are on rt/NAME/image_raw.
+/// Returns the topics of the camera whose images are on rt/NAME/image_raw; ROS 2's users write /NAME, too.
 inline Topic<sensor_msgs::msg::Image> camera_image(const std::string& name) {
-  return {"rt/" + name + "/image_raw", kImages};
+  return {(name.starts_with('/') ? "rt" : "rt/") + name + "/image_raw", kImages};
 }
 inline Topic<sensor_msgs::msg::CameraInfo> camera_info(const std::string& name) {
-  return {"rt/" + name + "/camera_info", kImages};
+  return {(name.starts_with('/') ? "rt" : "rt/") + name + "/camera_info", kImages};
 }
 
 }  // namespace jostle::wire

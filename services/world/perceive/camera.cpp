@@ -26,6 +26,7 @@ using Clock = std::chrono::steady_clock;
 using Eigen::Isometry3d;
 
 constexpr auto kTick = std::chrono::milliseconds(100);
+constexpr auto kSilence = std::chrono::seconds(5);
 constexpr double kDoubtfulTilt = 10.0 * M_PI / 180;  // most objects stand
 constexpr double kMostDoubt = 9.0;
 
@@ -139,13 +140,21 @@ Result<void> look_through_camera(const wire::Participant& participant, const Cam
   Sight sight(participant, std::move(scene_result).value());
   common::Trouble bad("images of another size");
   std::uint64_t frames = 0;
+  Clock::time_point silent_since = Clock::now();
   perception::GreyImage last;
   std::vector<perception::Detection> found_last;
   spdlog::info("looking at {}, domain {}", options.source, participant.domain());
   while (!stop.stop_requested() && !source.has_ended()) {
     auto shot_result = source.take(Clock::now() + kTick, stop);
     if (!shot_result) return shot_result.error();
-    if (!*shot_result) continue;
+    if (!*shot_result) {
+      if (frames == 0 && Clock::now() > silent_since + kSilence) {
+        silent_since = Clock::now();
+        spdlog::warn("no image{} from {} for {} s; `jostle doctor --camera {}` says what comes",
+                     source.camera() ? "" : ", or no intrinsics,", options.source, kSilence.count(), options.source);
+      }
+      continue;
+    }
     const perception::GreyImage& image = (*shot_result)->image;
     const perception::Camera& camera = *source.camera();
     if (image.width != camera.width || image.height != camera.height) {

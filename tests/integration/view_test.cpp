@@ -79,8 +79,9 @@ TEST(ViewServer, AnswersBadRequestsAndGoesOn) {
     EXPECT_EQ(status["level"], 2);
     return status["message"].get<std::string>();
   };
-  EXPECT_THAT(complaint("{"), HasSubstr("no JSON"));
-  EXPECT_THAT(complaint(std::string(60'000, '[')), HasSubstr("no JSON"));
+  EXPECT_THAT(complaint("{"), HasSubstr("not JSON"));
+  EXPECT_THAT(complaint(std::string(60'000, '[')), HasSubstr("not JSON"));
+  EXPECT_THAT(complaint(std::string(30'000, '[') + std::string(30'000, ']')), HasSubstr("more than 64 deep"));
   EXPECT_THAT(complaint("[1]"), HasSubstr("wanted an object"));
   EXPECT_THAT(complaint(R"({"op":"advertise","channels":[]})"), HasSubstr("this server only shows"));
   EXPECT_THAT(complaint(R"({"op":"subscribe"})"), HasSubstr("subscriptions: got null, wanted a list"));

@@ -92,7 +92,7 @@ TEST(ViewServer, AnswersBadRequestsAndGoesOn) {
               HasSubstr("there is nothing to set"));
   viewer.send_binary("\x01publish");
   EXPECT_THAT(viewer.next_op("status")["message"].get<std::string>(), HasSubstr("takes no messages"));
-  EXPECT_EQ(sut->counts().invalid_requests, 10u);
+  EXPECT_EQ(sut->counts().invalid_requests, 11u);
   EXPECT_EQ(sut->counts().viewers, 1u);
 
   // One that is too long ends its connection, and no other.
